@@ -1,0 +1,127 @@
+#include "closed_loop.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "kernels/kernels.hpp"
+
+namespace mixed_order_game {
+
+ClosedLoop::ClosedLoop(Parameters parameters)
+    : parameters_(std::move(parameters)), layout_(parameters_.shape) {
+  refresh();
+}
+
+void ClosedLoop::refresh() { parameters_.refresh(); }
+
+void ClosedLoop::initial_state(Real* state) const {
+  const InitialState& initial = parameters_.initial;
+  std::copy(initial.x.begin(), initial.x.end(), state + layout_.x());
+  std::copy(initial.reference.begin(), initial.reference.end(), state + layout_.reference());
+  std::copy(initial.y.begin(), initial.y.end(), state + layout_.estimates());
+  std::fill(state + layout_.weights(), state + layout_.size(), 0.0);
+}
+
+void ClosedLoop::evaluate(Real t, const Real* state, const Real* d_ext, const Modes& modes, Signals& signals,
+                          Real* rate) const {
+  const Kernels& kernel = kernels();
+  const auto& [shape, gains, strategy, rbf, graph, cost, dynamics, disturbance, initial] = parameters_;
+  const int players = shape.players;
+  const int n = shape.actions();
+  const int neurons = shape.neurons;
+  const Real* x = state + layout_.x();
+  const Real* reference = state + layout_.reference();  // z or v
+  const Real* y = state + layout_.estimates();
+  const Real* W = state + layout_.weights();
+  Real* e = signals.error.data();
+  Real* s = signals.network.data();
+  Real* phi = signals.robust.data();
+  Real* gradient = signals.gradient.data();
+  Real* d = signals.disturbance.data();
+  Real* g = signals.dynamics.data();
+
+  cost->own_gradients(y, n, gradient);
+  for (int l = 0; l < shape.dimension; ++l) {
+    for (int i = 0; i < players; ++i) {
+      const int p = l * players + i;
+      if (shape.is_second_order(i)) {
+        signals.shared[at(p)] = x[p];
+        e[p] = reference[p] + gains.k2 * gradient[p];  // e_i = v_i + k2 grad_i f_i(y_i)
+      } else {
+        signals.shared[at(p)] = reference[p];
+        e[p] = x[p] - reference[p];  // e_i = x_i - z_i
+      }
+    }
+  }
+
+  if (strategy.robust) {
+    const auto activations = rbf.diagonal ? kernel.activations_diagonal : kernel.activations_general;
+    activations(players, shape.dimension, neurons, rbf.centers.data(), rbf.width, y, signals.exponent.data(),
+                signals.activation.data());
+    kernel.column_products(n, neurons, W, signals.activation.data(), s);
+    // phi_i = delta tanh(K delta e_i / epsilon)
+    kernel.scaled_tanh(n, gains.delta, robust_term_constant * gains.delta / gains.epsilon, e, phi);
+    for (int p = 0; p < n; ++p) signals.radial[at(p)] = modes[at(p)] != 0 ? s[p] / rbf.W_max : 0.0;
+    kernel.weight_rates(n, neurons, gains.beta, e, signals.radial.data(), signals.activation.data(), W,
+                        rate + layout_.weights());
+  } else {
+    // the estimation module is absent: neither network nor robust term, and weights at rest
+    std::fill_n(s, n, 0.0);
+    std::fill_n(phi, n, 0.0);
+    std::fill(rate + layout_.weights(), rate + layout_.size(), 0.0);
+  }
+
+  if (strategy.perturbed) {
+    dynamics->values(x, g);
+    disturbance->values(t, d);
+    for (int p = 0; p < n; ++p) d[p] += d_ext[p];
+  } else {
+    std::fill_n(g, n, 0.0);
+    std::copy_n(d_ext, n, d);
+  }
+
+  for (int l = 0; l < shape.dimension; ++l) {
+    for (int i = 0; i < players; ++i) {
+      const int p = l * players + i;
+      const bool second = shape.is_second_order(i);
+      // u_i = -k1 e_i - W_i' S_i - phi_i (order 1), -k4 e_i - W_i' S_i - phi_i (order 2)
+      const Real u = -(second ? gains.k4 : gains.k1) * e[p] - s[p] - phi[p];
+      const Real driven = u + g[p] + d[p];
+      signals.control[at(p)] = u;
+      rate[layout_.x() + p] = second ? reference[p] : driven;                            // x' = v or x' = u + g + d
+      rate[layout_.reference() + p] = second ? driven : -gains.k2 * gradient[p];  // v' = u + g + d or z' = -k2 grad
+    }
+  }
+  kernel.estimate_rates(players, shape.dimension, graph.neighbours(), gains.k3, y, signals.shared.data(),
+                        rate + layout_.estimates());
+}
+
+void ClosedLoop::weight_norms(const Real* state, Real* norm2) const {
+  const Real* W = state + layout_.weights();
+  kernels().column_products(shape().actions(), shape().neurons, W, W, norm2);
+}
+
+void ClosedLoop::resolve_modes(const Real* norm2, const Signals& signals, Modes& modes) const {
+  for (std::size_t p = 0; p < modes.size(); ++p) {
+    const bool reached = modes[p] != 0 || norm2[p] >= parameters_.rbf.W_max;
+    const bool outward = signals.error[p] * signals.network[p] >= 0.0;
+    modes[p] = parameters_.strategy.robust && reached && outward ? 1 : 0;
+  }
+}
+
+void ClosedLoop::project(const Modes& modes, Real* state) const {
+  const Real W_max = parameters_.rbf.W_max;
+  for (int p = 0; p < shape().actions(); ++p) {
+    Real norm2 = 0.0;
+    for (int m = 0; m < shape().neurons; ++m) {
+      const Real w = state[layout_.weights_of(m) + p];
+      norm2 += w * w;
+    }
+    if (norm2 > W_max || (modes[at(p)] != 0 && norm2 > 0.0)) {
+      const Real factor = std::sqrt(W_max / norm2);
+      for (int m = 0; m < shape().neurons; ++m) state[layout_.weights_of(m) + p] *= factor;
+    }
+  }
+}
+
+}  // namespace mixed_order_game

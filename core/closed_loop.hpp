@@ -1,0 +1,49 @@
+// The closed loop as a pure function: state_rate = f(t, state, inputs, modes, parameters), and its output formulas.
+//
+// Plants, seeking laws, estimates, network and adaptation of the mixed-order game; notation.md lists the symbols.
+#pragma once
+
+#include "parameters.hpp"
+#include "signals.hpp"
+#include "state_layout.hpp"
+
+namespace mixed_order_game {
+
+/// K = exp(-(K + 1)), the constant of the robust term's bound.
+inline constexpr Real robust_term_constant = 0.2784645427610738;
+
+class ClosedLoop {
+ public:
+  explicit ClosedLoop(Parameters parameters);
+
+  [[nodiscard]] const Parameters& parameters() const { return parameters_; }
+  /// For edits; call refresh() before the next evaluation.
+  [[nodiscard]] Parameters& parameters() { return parameters_; }
+  void refresh();
+
+  [[nodiscard]] const Shape& shape() const { return parameters_.shape; }
+  [[nodiscard]] const StateLayout& layout() const { return layout_; }
+
+  /// state[size()] at the start of a run, from x0, z0, v0, y0 and W = 0.
+  void initial_state(Real* state) const;
+
+  /// Signals and state rates at time t [s]; d_ext[entry(i, l)] is the external disturbance.
+  void evaluate(Real t, const Real* state, const Real* d_ext, const Modes& modes, Signals& signals, Real* rate) const;
+
+  /// w'w of each weight column, at entry(i, l).
+  void weight_norms(const Real* state, Real* norm2) const;
+
+  /// Which mode each column has from here on: on the sphere if it is there, or has reached it with w'w >= W_max, and
+  /// e w'S >= 0. Signals and norms w'w as of this state.
+  void resolve_modes(const Real* norm2, const Signals& signals, Modes& modes) const;
+
+  /// Puts the state where the modes say it is: columns on the sphere are scaled to w'w = W_max, and columns inside
+  /// that lie above the bound are scaled back to it.
+  void project(const Modes& modes, Real* state) const;
+
+ private:
+  Parameters parameters_;
+  StateLayout layout_;
+};
+
+}  // namespace mixed_order_game

@@ -1,0 +1,63 @@
+#include "communication_graph.hpp"
+
+#include <algorithm>
+
+namespace mixed_order_game {
+
+CommunicationGraph::CommunicationGraph(int players)
+    : players_(players), adjacency_(at(players) * at(players)) {
+  refresh();
+}
+
+void CommunicationGraph::set_weight(int i, int j, Real weight) {
+  adjacency_[at(i) * at(players_) + at(j)] = weight;
+  adjacency_[at(j) * at(players_) + at(i)] = weight;
+}
+
+void CommunicationGraph::refresh() {
+  start_.assign(1, 0);
+  neighbour_.clear();
+  weight_.clear();
+  for (int i = 0; i < players_; ++i) {
+    for (int j = 0; j < players_; ++j) {
+      if (weight(i, j) != 0.0) {
+        neighbour_.push_back(j);
+        weight_.push_back(weight(i, j));
+      }
+    }
+    start_.push_back(static_cast<int>(neighbour_.size()));
+  }
+}
+
+std::vector<std::pair<int, int>> CommunicationGraph::edges() const {
+  std::vector<std::pair<int, int>> edges;
+  for (int i = 0; i < players_; ++i) {
+    for (int j = i + 1; j < players_; ++j) {
+      if (weight(i, j) > 0.0) edges.emplace_back(i, j);
+    }
+  }
+  return edges;
+}
+
+std::vector<std::vector<int>> CommunicationGraph::components() const {
+  std::vector<std::vector<int>> components;
+  std::vector<bool> seen(at(players_), false);
+  for (int root = 0; root < players_; ++root) {
+    if (seen[at(root)]) continue;
+    std::vector<int> component{root};
+    seen[at(root)] = true;
+    for (std::size_t next = 0; next < component.size(); ++next) {
+      for (int j = 0; j < players_; ++j) {
+        if (!seen[at(j)] && weight(component[next], j) > 0.0) {
+          seen[at(j)] = true;
+          component.push_back(j);
+        }
+      }
+    }
+    std::sort(component.begin(), component.end());
+    components.push_back(std::move(component));
+  }
+  return components;
+}
+
+}  // namespace mixed_order_game

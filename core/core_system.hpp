@@ -1,0 +1,31 @@
+// The small linear system that is left of a Newton matrix when weights, estimates and velocities are eliminated.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "types.hpp"
+
+namespace mixed_order_game {
+
+class CoreSystem {
+ public:
+  virtual ~CoreSystem() = default;
+
+  virtual void clear() = 0;
+  /// Adds to an entry; with a sparse core only where its pattern has one.
+  virtual void add(int row, int column, Real value) = 0;
+  /// A row to add to directly; null when the core is sparse.
+  virtual Real* dense_row(int row) = 0;
+  /// False when the matrix is numerically singular.
+  virtual bool factor() = 0;
+  virtual void solve(Real* b) = 0;
+};
+
+/// LU with partial pivoting of all entries.
+std::unique_ptr<CoreSystem> make_dense_core(int unknowns);
+
+/// Sparse LU for the pattern given by the columns of each row (in any order, repeats allowed).
+std::unique_ptr<CoreSystem> make_sparse_core(const std::vector<std::vector<int>>& rows);
+
+}  // namespace mixed_order_game

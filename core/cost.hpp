@@ -1,0 +1,34 @@
+// Cost functions f_i(x) of the players, as the closed loop sees them: values, own-action gradients
+// grad_i f_i and the rows of their Hessian. Another family of games implements this interface.
+#pragma once
+
+#include <memory>
+
+#include "sparse_rows.hpp"
+#include "types.hpp"
+
+namespace mixed_order_game {
+
+class Cost {
+ public:
+  virtual ~Cost() = default;
+  [[nodiscard]] virtual std::unique_ptr<Cost> clone() const = 0;
+
+  /// f_i(x) for a joint action x of length N D.
+  [[nodiscard]] virtual Real value(int i, const Real* x) const = 0;
+
+  /// gradient[entry(i, l)] = d f_i / d x_il at the joint action points + i * stride, for every player i.
+  /// A stride of N D evaluates each player at its own estimate y_i, a stride of 0 all players at one x.
+  virtual void own_gradients(const Real* points, int stride, Real* gradient) const = 0;
+
+  /// Row entry(i, l): the columns entry(j, h) at which d^2 f_i / (d x_il d x_jh) may differ from zero.
+  [[nodiscard]] virtual const SparseRows& hessian_pattern() const = 0;
+
+  /// The entries of hessian_pattern(), row entry(i, l) at the joint action points + i * stride.
+  virtual void hessian_rows(const Real* points, int stride, Real* values) const = 0;
+
+  /// Rebuilds what was derived from coefficients; called after any of them changed.
+  virtual void refresh() = 0;
+};
+
+}  // namespace mixed_order_game

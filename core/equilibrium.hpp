@@ -1,0 +1,19 @@
+// The Nash equilibrium x* of the game and how strongly monotone its pseudo-gradient is.
+#pragma once
+
+#include <vector>
+
+#include "cost.hpp"
+
+namespace mixed_order_game {
+
+/// x*, at entry(i, l): the joint action at which every grad_i f_i vanishes. For quadratic costs the pseudo-gradient
+/// P(x) = (grad_1 f_1, ..., grad_N f_N) is affine and one linear solve gives it; other costs take Newton steps.
+/// Throws GameError when it is not unique, that is when the Jacobian of P is singular.
+std::vector<Real> nash_equilibrium(const Cost& cost, const Shape& shape);
+
+/// The largest m with (x - z)'(P(x) - P(z)) >= m |x - z|^2: the smallest eigenvalue of the symmetric part of the
+/// Jacobian of P, at x = 0 (which is everywhere for quadratic costs).
+Real strong_monotonicity(const Cost& cost, const Shape& shape);
+
+}  // namespace mixed_order_game

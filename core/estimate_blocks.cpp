@@ -1,0 +1,80 @@
+#include "estimate_blocks.hpp"
+
+#include <Eigen/OrderingMethods>
+#include <Eigen/SparseCore>
+#include <algorithm>
+#include <set>
+
+namespace mixed_order_game {
+
+void EstimateBlocks::analyse(const CommunicationGraph& graph) {
+  players_ = graph.players();
+  const int n = players_;
+  std::vector<Eigen::Triplet<double, int>> entries;
+  for (int i = 0; i < n; ++i) entries.emplace_back(i, i, 1.0);
+  for (const auto& [i, j] : graph.edges()) {
+    entries.emplace_back(i, j, 1.0);
+    entries.emplace_back(j, i, 1.0);
+  }
+  Eigen::SparseMatrix<double> matrix(n, n);
+  matrix.setFromTriplets(entries.begin(), entries.end());
+  Eigen::PermutationMatrix<Eigen::Dynamic, Eigen::Dynamic, int> permutation;
+  Eigen::AMDOrdering<int>()(matrix, permutation);
+  order_.assign(permutation.indices().data(), permutation.indices().data() + n);
+  std::vector<int> position(at(n));
+  for (int k = 0; k < n; ++k) position[at(order_[at(k)])] = k;
+
+  // elimination of k joins all its later neighbours
+  std::vector<std::set<int>> column(at(n));
+  for (const auto& [i, j] : graph.edges()) {
+    column[at(std::min(position[at(i)], position[at(j)]))].insert(std::max(position[at(i)], position[at(j)]));
+  }
+  start_.assign(1, 0);
+  row_.clear();
+  for (int k = 0; k < n; ++k) {
+    const std::set<int>& rows = column[at(k)];
+    row_.insert(row_.end(), rows.begin(), rows.end());
+    start_.push_back(static_cast<int>(row_.size()));
+    if (!rows.empty()) column[at(*rows.begin())].insert(std::next(rows.begin()), rows.end());
+  }
+  target_.clear();
+  for (int k = 0; k < n; ++k) {
+    for (int a = start_[at(k)]; a < start_[at(k + 1)]; ++a) {
+      for (int b = start_[at(k)]; b < a; ++b) {
+        const int to = row_[at(b)];  // the entry at row[a] of column row[b]
+        const auto found = std::lower_bound(row_.begin() + start_[at(to)], row_.begin() + start_[at(to + 1)], row_[at(a)]);
+        target_.push_back(static_cast<int>(found - row_.begin()));
+      }
+    }
+  }
+  lower_.resize(row_.size() * at(n));
+  diagonal_.resize(at(n) * at(n));
+  gain_.resize(at(n) * at(n));
+}
+
+void EstimateBlocks::factor(const CommunicationGraph& graph, Real gamma_k3) {
+  const int n = players_;
+  for (int k = 0; k < n; ++k) {
+    const int i = order_[at(k)];
+    Real degree = 0.0;
+    for (int j = 0; j < n; ++j) degree += graph.weight(i, j);
+    for (int j = 0; j < n; ++j) {
+      const Real shared = gamma_k3 * graph.weight(i, j);
+      diagonal_[at(k * n + j)] = 1.0 + gamma_k3 * degree + shared;
+      gain_[at(i * n + j)] = shared;
+    }
+    for (int a = start_[at(k)]; a < start_[at(k + 1)]; ++a) {
+      const Real edge = -gamma_k3 * graph.weight(i, order_[at(row_[at(a)])]);
+      std::fill_n(lower_.begin() + static_cast<std::ptrdiff_t>(a) * n, n, edge);
+    }
+  }
+  kernels().factor_blocks(pattern(), lower_.data(), diagonal_.data());
+  for (Real& d : diagonal_) d = 1.0 / d;
+  solve(1, gain_.data());
+}
+
+void EstimateBlocks::solve(int dimension, Real* rows) const {
+  kernels().solve_blocks(pattern(), dimension, lower_.data(), diagonal_.data(), rows);
+}
+
+}  // namespace mixed_order_game

@@ -1,0 +1,44 @@
+// The part of the Newton matrix that belongs to the estimates.
+//
+// The consensus law couples y_ij only with y_kj of the same j and coordinate, so I - gamma J splits into the N matrices
+// B_j = I + gamma k3 (L + diag(a_.j)), each used for every coordinate. All have the pattern of the graph: one symbolic
+// analysis (minimum degree), and a numeric L D L' that treats the N blocks side by side.
+#pragma once
+
+#include <vector>
+
+#include "aligned_vector.hpp"
+#include "communication_graph.hpp"
+
+namespace mixed_order_game {
+
+class EstimateBlocks {
+ public:
+  /// Symbolic analysis; needed again when an edge appeared or vanished, and harmless otherwise.
+  void analyse(const CommunicationGraph& graph);
+
+  /// Numeric factors for gamma k3 > 0.
+  void factor(const CommunicationGraph& graph, Real gamma_k3);
+
+  /// Solves for rows y_i of dimension * N entries, in place.
+  void solve(int dimension, Real* rows) const;
+
+  /// gain[i * N + j] = d y_ij / d xbar_j when everything else is eliminated: column j is gamma k3 B_j^-1 a_.j.
+  [[nodiscard]] const AlignedVector& shared_signal_gain() const { return gain_; }
+
+ private:
+  [[nodiscard]] BlockPattern pattern() const {
+    return {players_, start_.data(), row_.data(), order_.data(), target_.data()};
+  }
+
+  int players_ = 0;
+  std::vector<int> start_;
+  std::vector<int> row_;
+  std::vector<int> order_;
+  std::vector<int> target_;
+  AlignedVector lower_;
+  AlignedVector diagonal_;
+  AlignedVector gain_;
+};
+
+}  // namespace mixed_order_game

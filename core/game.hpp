@@ -1,0 +1,39 @@
+// A game as its definition file states it: names, what to expose, and the parameters and initial state of a run.
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "parameters.hpp"
+#include "polynomial_dynamics.hpp"
+#include "quadratic_cost.hpp"
+#include "sinusoidal_disturbance.hpp"
+
+namespace mixed_order_game {
+
+/// Which variables an FMU of the game has: everything, or without y, y0, W and with edges and couplings only where
+/// they are not zero.
+enum class Expose { all, outputs };
+
+struct Game {
+  std::string title;
+  Expose expose = Expose::all;
+  std::vector<std::string> player_names;
+  Parameters parameters;
+};
+
+/// The family's coefficients inside parameters that were made by parse_game.
+inline QuadraticCost& cost_of(Parameters& parameters) { return static_cast<QuadraticCost&>(*parameters.cost); }
+inline PolynomialDynamics& dynamics_of(Parameters& parameters) {
+  return static_cast<PolynomialDynamics&>(*parameters.dynamics);
+}
+inline SinusoidalDisturbance& disturbance_of(Parameters& parameters) {
+  return static_cast<SinusoidalDisturbance&>(*parameters.disturbance);
+}
+
+/// Reads a game definition (TOML). Throws GameError with one sentence that names the entry, its value and what was
+/// expected: syntax, missing and unknown keys, lengths, ranges, a disconnected graph, no unique equilibrium.
+Game parse_game(std::string_view toml);
+
+}  // namespace mixed_order_game

@@ -1,0 +1,295 @@
+// Reads a game definition: every entry of the file is checked here, once, and trusted from here on.
+#include <algorithm>
+#include <set>
+
+#include "equilibrium.hpp"
+#include "errors.hpp"
+#include "game.hpp"
+#include "toml_reader.hpp"
+
+namespace mixed_order_game {
+
+namespace {
+
+constexpr int most_players = 1000;
+constexpr int most_coordinates = 100;
+constexpr std::size_t most_neurons = 10'000;
+constexpr std::int64_t most_states = 20'000'000;
+constexpr std::int64_t most_exposed = 20'000;  // variables that are exposed without being asked for
+
+Shape read_shape(const TomlEntry& game) {
+  Shape shape;
+  shape.dimension = game["dimension"].integer(1, most_coordinates);
+
+  const TomlEntry players = game["player"];
+  const std::string some_players = "2 to " + std::to_string(most_players) + " tables [[player]]";
+  const std::size_t player_count = players.length(some_players);
+  if (player_count < 2 || player_count > at(most_players)) players.fail(some_players);
+  shape.players = static_cast<int>(player_count);
+
+  const TomlEntry centers = game["rbf"]["centers"];
+  const std::string some_centers = "a list of 1 to " + std::to_string(most_neurons) + " centers";
+  const std::size_t neuron_count = centers.length(some_centers);
+  if (neuron_count < 1 || neuron_count > most_neurons) centers.fail(some_centers);
+  shape.neurons = static_cast<int>(neuron_count);
+
+  const std::int64_t N = shape.players;
+  const std::int64_t states = (2 + N + shape.neurons) * N * shape.dimension;
+  if (states > most_states) {
+    throw GameError("the game of " + std::to_string(N) + " players, dimension " + std::to_string(shape.dimension) +
+                    " and " + std::to_string(shape.neurons) + " centers has " + std::to_string(states) +
+                    " states, expected at most " + std::to_string(most_states));
+  }
+  return shape;
+}
+
+Gains read_gains(const TomlEntry& gains) {
+  gains.accept_keys({"k1", "k2", "k3", "k4", "beta", "delta", "epsilon"});
+  return {.k1 = gains["k1"].positive(),
+          .k2 = gains["k2"].positive(),
+          .k3 = gains["k3"].positive(),
+          .k4 = gains["k4"].positive(),
+          .beta = gains["beta"].non_negative(),
+          .delta = gains["delta"].non_negative(),
+          .epsilon = gains["epsilon"].positive()};
+}
+
+Strategy read_strategy(const TomlEntry& strategy) {
+  strategy.accept_keys({"robust", "perturbed"});
+  Strategy read;
+  if (strategy["robust"].present()) read.robust = strategy["robust"].boolean();
+  if (strategy["perturbed"].present()) read.perturbed = strategy["perturbed"].boolean();
+  return read;
+}
+
+RbfNetwork read_network(const TomlEntry& rbf, const Shape& shape) {
+  RbfNetwork network;
+  network.width = rbf["width"].positive();
+  network.W_max = rbf["W_max"].positive();
+  const TomlEntry centers = rbf["centers"];
+  network.diagonal = !centers.item(0).is_list();
+  const int n = shape.actions();
+  network.centers.resize(at(shape.neurons) * at(network.diagonal ? 1 : n));
+  for (int m = 0; m < shape.neurons; ++m) {
+    const TomlEntry center = centers.item(at(m));
+    if (network.diagonal) {
+      network.centers[at(m)] = center.number();
+      continue;
+    }
+    const std::string expected = "a list of " + std::to_string(n) + " numbers, player by player, as the first center is a list";
+    if (center.length(expected) != at(n)) center.fail(expected);
+    for (int j = 0; j < shape.players; ++j) {
+      for (int l = 0; l < shape.dimension; ++l) {
+        network.centers[at(m * n + shape.entry(j, l))] = center.item(at(j * shape.dimension + l)).number();
+      }
+    }
+  }
+  return network;
+}
+
+std::string groups(const std::vector<std::vector<int>>& components) {
+  constexpr std::size_t longest = 200;
+  std::string text;
+  for (const std::vector<int>& component : components) {
+    text += text.empty() ? "{" : ", {";
+    for (std::size_t k = 0; k < component.size(); ++k) text += (k == 0 ? "" : ", ") + std::to_string(component[k] + 1);
+    text += '}';
+    if (text.size() > longest) return text.substr(0, text.rfind(',', longest)) + ", ...";
+  }
+  return text;
+}
+
+CommunicationGraph read_graph(const TomlEntry& table, int players) {
+  table.accept_keys({"edges"});
+  CommunicationGraph graph(players);
+  const TomlEntry edges = table["edges"];
+  const std::size_t count = edges.length("a list of edges [i, j] or [i, j, weight]");
+  for (std::size_t k = 0; k < count; ++k) {
+    constexpr std::string_view expected = "an edge [i, j] or [i, j, weight]";
+    const TomlEntry edge = edges.item(k);
+    const std::size_t length = edge.length(expected);
+    if (length != 2 && length != 3) edge.fail(expected);
+    const int i = edge.item(0).integer(1, players) - 1;
+    const int j = edge.item(1).integer(1, players) - 1;
+    if (i == j) edge.fail("an edge between two different players");
+    if (graph.weight(i, j) != 0.0) edge.fail("each edge once, in one of its directions");
+    graph.set_weight(i, j, length == 3 ? edge.item(2).positive() : 1.0);
+  }
+  graph.refresh();
+  const auto components = graph.components();
+  if (components.size() > 1) {
+    throw GameError(edges.path() + " leaves the players in separate groups " + groups(components) +
+                    ", expected a connected graph");
+  }
+  return graph;
+}
+
+// Pairs [j, value], each j once, as for cost coupling and dynamics; read(j, value) takes them.
+template <typename Read>
+void read_pairs(const TomlEntry& list, int players, std::string_view pair, Read read) {
+  if (!list.present()) return;
+  const std::size_t count = list.length("a list of pairs " + std::string(pair));
+  std::vector<bool> seen(at(players), false);
+  for (std::size_t k = 0; k < count; ++k) {
+    const TomlEntry entry = list.item(k);
+    if (entry.length(pair) != 2) entry.fail("a pair " + std::string(pair));
+    const int j = entry.item(0).integer(1, players) - 1;
+    if (seen[at(j)]) entry.fail("each player once, and player " + std::to_string(j + 1) + " comes twice");
+    seen[at(j)] = true;
+    read(j, entry.item(1));
+  }
+}
+
+void read_cost(const TomlEntry& table, int i, const Shape& shape, QuadraticCost& cost) {
+  table.accept_keys({"quadratic", "linear", "constant", "coupling"});
+  cost.quadratic[at(i)] = table["quadratic"].number_or(0.0);
+  cost.constant[at(i)] = table["constant"].number_or(0.0);
+  table["linear"].numbers_if_present(shape.dimension, shape.players, &cost.linear[at(i)]);
+  read_pairs(table["coupling"], shape.players, "[j, c_ij]", [&](int j, const TomlEntry& value) {
+    if (j == i) value.fail("no coupling of player " + std::to_string(i + 1) + " with itself");
+    cost.coupling[at(i) * at(shape.players) + at(j)] = value.number();
+  });
+}
+
+void read_dynamics(const TomlEntry& table, int i, const Shape& shape, std::vector<PolynomialTerm>& terms) {
+  table.accept_keys({"linear", "square"});
+  const int D = shape.dimension;
+  std::vector<std::vector<PolynomialTerm>> of_player(at(shape.players));  // by j, then l; empty where j is not named
+  const auto read = [&](std::string_view key, Real PolynomialTerm::*coefficient) {
+    read_pairs(table[key], shape.players, "[j, coefficients]", [&](int j, const TomlEntry& value) {
+      std::vector<Real> coefficients(at(D));
+      value.numbers(D, 1, coefficients.data());
+      auto& own = of_player[at(j)];
+      if (own.empty()) {
+        for (int l = 0; l < D; ++l) own.push_back({.player = i, .other = j, .coordinate = l});
+      }
+      for (int l = 0; l < D; ++l) own[at(l)].*coefficient = coefficients[at(l)];
+    });
+  };
+  read("linear", &PolynomialTerm::linear);
+  read("square", &PolynomialTerm::square);
+  for (const auto& own : of_player) {
+    std::copy_if(own.begin(), own.end(), std::back_inserter(terms),
+                 [](const PolynomialTerm& term) { return term.linear != 0.0 || term.square != 0.0; });
+  }
+}
+
+void read_disturbance(const TomlEntry& table, int i, const Shape& shape, SinusoidalDisturbance& disturbance) {
+  table.accept_keys({"amplitude", "frequency", "phase", "bias"});
+  table["amplitude"].numbers_if_present(shape.dimension, shape.players, &disturbance.amplitude[at(i)]);
+  table["frequency"].numbers_if_present(shape.dimension, shape.players, &disturbance.frequency[at(i)]);
+  table["phase"].numbers_if_present(shape.dimension, shape.players, &disturbance.phase[at(i)]);
+  table["bias"].numbers_if_present(shape.dimension, shape.players, &disturbance.bias[at(i)]);
+}
+
+void read_initial_state(const TomlEntry& player, int i, const Shape& shape, InitialState& initial) {
+  const bool second = shape.is_second_order(i);
+  if (second && player["z0"].present()) player["z0"].fail("no z0 for a player of order 2, which has v0");
+  if (!second && player["v0"].present()) player["v0"].fail("no v0 for a player of order 1, which has z0");
+  player["x0"].numbers(shape.dimension, shape.players, &initial.x[at(i)]);
+  player[second ? "v0" : "z0"].numbers_if_present(shape.dimension, shape.players, &initial.reference[at(i)]);
+
+  const TomlEntry y0 = player["y0"];
+  Real* estimates = &initial.y[at(i) * at(shape.actions())];
+  if (!y0.is_list()) {
+    std::fill_n(estimates, shape.actions(), y0.number_or(0.0));
+    return;
+  }
+  const std::string expected =
+      "a list of " + std::to_string(shape.players) + " estimates, one for each player, or one number";
+  if (y0.length(expected) != at(shape.players)) y0.fail(expected);
+  for (int j = 0; j < shape.players; ++j) y0.item(at(j)).numbers(shape.dimension, shape.players, estimates + j);
+}
+
+// Number of variables when everything is exposed.
+std::int64_t variable_count(const Shape& shape, bool diagonal) {
+  const std::int64_t N = shape.players;
+  const std::int64_t D = shape.dimension;
+  const std::int64_t q = shape.neurons;
+  const std::int64_t gains = 7;
+  const std::int64_t network = 2 + (diagonal ? q : 0);             // W_max, rho, center
+  const std::int64_t graph_and_cost = N * (N - 1) / 2 + N + N * D + N * (N - 1);
+  const std::int64_t dynamics_and_disturbance = N + 4 * N * D;
+  const std::int64_t switches = 3;                                 // robust, perturbed, allow_disconnected
+  const std::int64_t initial_state = 2 * N * D + N * N * D;        // x0, z0 or v0, y0
+  const std::int64_t tolerances = 2;
+  const std::int64_t states = (2 + N + q) * N * D;                 // x, z or v, y, W
+  const std::int64_t signals = 6 * N * D + N;                      // d_ext, u, x_star, W_norm2, phi, nn, cost
+  const std::int64_t measures = 3 + 3 + N;                         // errors and gradient, solver work, order
+  return gains + network + graph_and_cost + dynamics_and_disturbance + switches + initial_state + tolerances + states +
+         signals + measures;
+}
+
+Expose read_expose(const TomlEntry& expose, const Shape& shape, bool diagonal) {
+  if (!expose.present()) return variable_count(shape, diagonal) <= most_exposed ? Expose::all : Expose::outputs;
+  const std::string text = expose.text();
+  if (text != "all" && text != "outputs") expose.fail("\"all\" or \"outputs\"");
+  return text == "all" ? Expose::all : Expose::outputs;
+}
+
+std::vector<std::string> read_names(const TomlEntry& players, int count) {
+  std::vector<std::string> names;
+  std::set<std::string> seen;
+  for (int i = 0; i < count; ++i) {
+    const TomlEntry name = players.item(at(i))["name"];
+    names.push_back(name.text());
+    if (names.back().empty()) name.fail("a name that is not empty");
+    if (!seen.insert(names.back()).second) name.fail("a name that no other player has");
+  }
+  return names;
+}
+
+}  // namespace
+
+Game parse_game(std::string_view toml) {
+  const toml::table document = parse_toml(toml);
+  const TomlEntry game(document);
+  game.accept_keys({"title", "dimension", "expose", "strategy", "gains", "rbf", "graph", "player"});
+  const std::string title = game["title"].text();
+  const TomlEntry rbf = game["rbf"];
+  rbf.accept_keys({"centers", "width", "W_max"});
+  Shape shape = read_shape(game);
+  const int n = shape.actions();
+
+  const TomlEntry players = game["player"];
+  for (int i = 0; i < shape.players; ++i) {
+    const TomlEntry player = players.item(at(i));
+    player.accept_keys({"name", "order", "x0", "z0", "v0", "y0", "cost", "dynamics", "disturbance"});
+    shape.order.push_back(player["order"].integer(1, 2));
+  }
+  const std::vector<std::string> names = read_names(players, shape.players);
+
+  QuadraticCost cost(shape.players, shape.dimension);
+  std::vector<PolynomialTerm> terms;
+  SinusoidalDisturbance disturbance(n);
+  InitialState initial{
+      .x = std::vector<Real>(at(n)), .reference = std::vector<Real>(at(n)), .y = std::vector<Real>(at(shape.players) * at(n))};
+  for (int i = 0; i < shape.players; ++i) {
+    const TomlEntry player = players.item(at(i));
+    read_initial_state(player, i, shape, initial);
+    read_cost(player["cost"], i, shape, cost);
+    read_dynamics(player["dynamics"], i, shape, terms);
+    read_disturbance(player["disturbance"], i, shape, disturbance);
+  }
+  cost.refresh();
+
+  Game read{.title = title,
+            .expose = Expose::all,
+            .player_names = names,
+            .parameters = {.shape = shape,
+                           .gains = read_gains(game["gains"]),
+                           .strategy = read_strategy(game["strategy"]),
+                           .rbf = read_network(rbf, shape),
+                           .graph = read_graph(game["graph"], shape.players),
+                           .cost = Cloned<Cost>(cost.clone()),
+                           .dynamics = Cloned<UnknownDynamics>(
+                               std::make_unique<PolynomialDynamics>(shape.players, shape.dimension, std::move(terms))),
+                           .disturbance = Cloned<Disturbance>(disturbance.clone()),
+                           .initial = std::move(initial)}};
+  read.expose = read_expose(game["expose"], shape, read.parameters.rbf.diagonal);
+  read.parameters.refresh();
+  nash_equilibrium(*read.parameters.cost, shape);  // throws when it is not unique
+  return read;
+}
+
+}  // namespace mixed_order_game

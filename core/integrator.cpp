@@ -1,0 +1,526 @@
+#include "integrator.hpp"
+
+#include <cvode/cvode.h>
+#include <nvector/nvector_serial.h>
+#include <sundials/sundials_linearsolver.h>
+#include <sundials/sundials_matrix.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <exception>
+#include <string>
+#include <utility>
+
+#include "errors.hpp"
+#include "kernels/kernels.hpp"
+
+namespace mixed_order_game {
+
+namespace {
+
+#if SUNDIALS_VERSION_MAJOR < 7
+using SunBoolean = booleantype;
+#else
+using SunBoolean = sunbooleantype;
+#endif
+using SunReal = sunrealtype;
+using Size = sunindextype;
+
+// CVODE spends its time in a handful of vector operations: these replace the library's by the kernels.
+
+void vector_linear_sum(SunReal a, N_Vector x, SunReal b, N_Vector y, N_Vector z) {
+  kernels().linear_sum(NV_LENGTH_S(x), a, NV_DATA_S(x), b, NV_DATA_S(y), NV_DATA_S(z));
+}
+void vector_scale(SunReal c, N_Vector x, N_Vector z) {
+  kernels().scale(NV_LENGTH_S(x), c, NV_DATA_S(x), NV_DATA_S(z));
+}
+void vector_fill(SunReal c, N_Vector z) { kernels().fill(NV_LENGTH_S(z), c, NV_DATA_S(z)); }
+SunReal vector_weighted_norm(N_Vector x, N_Vector w) {
+  const Size n = NV_LENGTH_S(x);
+  return std::sqrt(kernels().weighted_square_sum(n, NV_DATA_S(x), NV_DATA_S(w)) / static_cast<Real>(n));
+}
+SunReal vector_max_norm(N_Vector x) { return kernels().max_norm(NV_LENGTH_S(x), NV_DATA_S(x)); }
+
+struct FreeContext {
+  void operator()(SUNContext context) const { SUNContext_Free(&context); }
+};
+struct FreeVector {
+  void operator()(N_Vector vector) const { N_VDestroy(vector); }
+};
+struct FreeMatrix {
+  void operator()(SUNMatrix matrix) const { SUNMatDestroy(matrix); }
+};
+struct FreeLinearSolver {
+  void operator()(SUNLinearSolver solver) const { SUNLinSolFree(solver); }
+};
+struct FreeCvode {
+  void operator()(void* memory) const { CVodeFree(&memory); }
+};
+using Context = std::unique_ptr<std::remove_pointer_t<SUNContext>, FreeContext>;
+using Vector = std::unique_ptr<std::remove_pointer_t<N_Vector>, FreeVector>;
+using Matrix = std::unique_ptr<std::remove_pointer_t<SUNMatrix>, FreeMatrix>;
+using LinearSolver = std::unique_ptr<std::remove_pointer_t<SUNLinearSolver>, FreeLinearSolver>;
+using Cvode = std::unique_ptr<void, FreeCvode>;
+
+Context make_context() {
+  SUNContext context = nullptr;
+#if SUNDIALS_VERSION_MAJOR < 7
+  if (SUNContext_Create(nullptr, &context) != 0) throw Error("SUNDIALS could not make a context");
+#else
+  if (SUNContext_Create(SUN_COMM_NULL, &context) != 0) throw Error("SUNDIALS could not make a context");
+  SUNContext_ClearErrHandlers(context);
+#endif
+  SUNContext_SetLogger(context, nullptr);
+  return Context(context);
+}
+
+Vector make_vector(int size, SUNContext context) {
+  N_Vector vector = N_VNew_Serial(size, context);
+  if (vector == nullptr) throw std::bad_alloc();
+  vector->ops->nvlinearsum = vector_linear_sum;
+  vector->ops->nvscale = vector_scale;
+  vector->ops->nvconst = vector_fill;
+  vector->ops->nvwrmsnorm = vector_weighted_norm;
+  vector->ops->nvmaxnorm = vector_max_norm;
+  N_VConst(0.0, vector);
+  return Vector(vector);
+}
+
+// The matrix is never formed: CVODE only hands it on.
+Matrix make_placeholder_matrix(SUNContext context) {
+  SUNMatrix matrix = SUNMatNewEmpty(context);
+  if (matrix == nullptr) throw std::bad_alloc();
+  matrix->ops->getid = [](SUNMatrix) { return SUNMATRIX_CUSTOM; };
+  matrix->ops->destroy = [](SUNMatrix stub) { SUNMatFreeEmpty(stub); };
+  return Matrix(matrix);
+}
+
+std::string in_seconds(Real t) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.9g s", t);
+  return text;
+}
+
+}  // namespace
+
+class Integrator::Implementation {
+ public:
+  Implementation(const ClosedLoop& loop, const ExternalDisturbance& input, std::unique_ptr<NewtonSolver> newton);
+
+  void start(Real t, Tolerances tolerances);
+  void restart(bool parameters_changed);
+  void advance(Real t_end);
+  void restore(const Checkpoint& checkpoint, Tolerances tolerances);
+  [[nodiscard]] Checkpoint checkpoint() const;
+  [[nodiscard]] Statistics statistics() const;
+
+  [[nodiscard]] Real time() const { return time_; }
+  [[nodiscard]] const Real* state() const { return state_.data(); }
+  [[nodiscard]] const Modes& modes() const { return modes_; }
+  [[nodiscard]] Real largest_raw_excess() const { return largest_raw_excess_; }
+
+ private:
+  void begin_at_restart_point();
+  void take_step();
+  void change_modes(Real t);
+  void present(Real t);
+  void interpolate(Real t, Real* state);
+  void settle(Real* state);
+  [[noreturn]] void fail(int flag, Real t);
+
+  // CVODE's callbacks
+  int rate(Real t, const Real* state, Real* rate) noexcept;
+  int event_functions(Real t, const Real* state, Real* values) noexcept;
+  int newton_matrix(Real t, const Real* state, Real gamma) noexcept;
+  int solve_newton(N_Vector x, N_Vector b) noexcept;
+
+  template <typename Action>
+  int guarded(Action action) noexcept {
+    try {
+      return action();
+    } catch (...) {
+      failure_ = std::current_exception();
+      return -1;
+    }
+  }
+
+  const ClosedLoop& loop_;
+  const ExternalDisturbance& input_;
+  std::unique_ptr<NewtonSolver> newton_;
+  LoopJacobian jacobian_;
+  int size_;
+  Tolerances tolerances_;
+
+  // last restart point
+  Real restart_time_ = 0.0;
+  AlignedVector restart_state_;
+  Modes restart_modes_;
+  Statistics restart_statistics_;
+  std::int64_t steps_since_restart_ = 0;
+
+  // where CVODE stands
+  Real internal_time_ = 0.0;
+  bool event_pending_ = false;
+  Real event_time_ = 0.0;
+  std::vector<int> event_columns_;  // 1 where a column's event function rose through zero
+
+  // communication point
+  Real time_ = 0.0;
+  AlignedVector state_;
+  Modes modes_;
+  Real largest_raw_excess_ = 0.0;
+
+  // scratch
+  Signals signals_;
+  AlignedVector d_ext_;
+  AlignedVector norm2_;
+  AlignedVector rate_;
+  AlignedVector event_values_;
+  std::int64_t newton_setups_ = 0;
+  std::int64_t newton_solves_ = 0;
+  std::exception_ptr failure_;
+  std::string message_;
+
+  Context context_;
+  Vector vector_;
+  Matrix matrix_;
+  LinearSolver linear_solver_;
+  Cvode cvode_;
+};
+
+Integrator::Implementation::Implementation(const ClosedLoop& loop, const ExternalDisturbance& input,
+                                           std::unique_ptr<NewtonSolver> newton)
+    : loop_(loop),
+      input_(input),
+      newton_(std::move(newton)),
+      jacobian_(loop),
+      size_(loop.layout().size()),
+      restart_state_(at(size_)),
+      restart_modes_(at(loop.shape().actions())),
+      event_columns_(at(loop.shape().actions())),
+      state_(at(size_)),
+      modes_(at(loop.shape().actions())),
+      signals_(loop.shape()),
+      d_ext_(at(loop.shape().actions())),
+      norm2_(at(loop.shape().actions())),
+      rate_(at(size_)),
+      event_values_(at(loop.shape().actions())),
+      context_(make_context()),
+      vector_(make_vector(size_, context_.get())),
+      matrix_(make_placeholder_matrix(context_.get())) {
+  using Self = Implementation*;
+  SUNLinearSolver solver = SUNLinSolNewEmpty(context_.get());
+  if (solver == nullptr) throw std::bad_alloc();
+  linear_solver_.reset(solver);
+  solver->content = this;
+  solver->ops->gettype = [](SUNLinearSolver) { return SUNLINEARSOLVER_DIRECT; };
+  solver->ops->free = [](SUNLinearSolver stub) {
+    SUNLinSolFreeEmpty(stub);
+    return 0;
+  };
+  solver->ops->solve = [](SUNLinearSolver self, SUNMatrix, N_Vector x, N_Vector b, SunReal) {
+    return static_cast<Self>(self->content)->solve_newton(x, b);
+  };
+
+  cvode_.reset(CVodeCreate(CV_BDF, context_.get()));
+  if (cvode_ == nullptr) throw std::bad_alloc();
+  void* memory = cvode_.get();
+#if SUNDIALS_VERSION_MAJOR < 7
+  CVodeSetErrHandlerFn(
+      memory, [](int, const char*, const char*, char* text, void* self) { static_cast<Self>(self)->message_ = text; },
+      this);
+#endif
+  CVodeSetUserData(memory, this);
+  const auto require = [](int flag, const char* call) {
+    if (flag < 0) throw Error(std::string("CVODE could not be set up: ") + call + " failed");
+  };
+  require(CVodeInit(
+              memory,
+              [](SunReal t, N_Vector y, N_Vector rate, void* self) {
+                return static_cast<Self>(self)->rate(t, NV_DATA_S(y), NV_DATA_S(rate));
+              },
+              0.0, vector_.get()),
+          "CVodeInit");
+  require(CVodeWFtolerances(memory,
+                            [](N_Vector y, N_Vector weight, void* self) {
+                              const Tolerances& tolerances = static_cast<Self>(self)->tolerances_;
+                              kernels().error_weights(NV_LENGTH_S(y), tolerances.relative, tolerances.absolute,
+                                                      NV_DATA_S(y), NV_DATA_S(weight));
+                              return 0;
+                            }),
+          "CVodeWFtolerances");
+  require(CVodeSetLinearSolver(memory, solver, matrix_.get()), "CVodeSetLinearSolver");
+  require(CVodeSetLinSysFn(memory,
+                           [](SunReal t, N_Vector y, N_Vector, SUNMatrix, SunBoolean, SunBoolean* is_current,
+                              SunReal gamma, void* self, N_Vector, N_Vector, N_Vector) {
+                             *is_current = SUNTRUE;
+                             return static_cast<Self>(self)->newton_matrix(t, NV_DATA_S(y), gamma);
+                           }),
+          "CVodeSetLinSysFn");
+  const int columns = loop.shape().actions();
+  require(CVodeRootInit(memory, columns,
+                        [](SunReal t, N_Vector y, SunReal* values, void* self) {
+                          return static_cast<Self>(self)->event_functions(t, NV_DATA_S(y), values);
+                        }),
+          "CVodeRootInit");
+  std::vector<int> rising(at(columns), 1);
+  require(CVodeSetRootDirection(memory, rising.data()), "CVodeSetRootDirection");
+  CVodeSetNoInactiveRootWarn(memory);
+}
+
+int Integrator::Implementation::rate(Real t, const Real* state, Real* rate) noexcept {
+  return guarded([&] {
+    input_.values(t, d_ext_.data());
+    loop_.evaluate(t, state, d_ext_.data(), modes_, signals_, rate);
+    Real sum;
+    Real squares;
+    kernels().moments(size_, rate, &sum, &squares);
+    return std::isfinite(squares) ? 0 : 1;  // 1: CVODE tries a smaller step
+  });
+}
+
+// One function for each column, which rises through zero where the column's mode ends: inside, w'w / W_max - 1;
+// on the sphere, -e w'S. It is never exactly zero, because CVODE would stop watching a function that begins at zero.
+int Integrator::Implementation::event_functions(Real t, const Real* state, Real* values) noexcept {
+  return guarded([&] {
+    const int n = loop_.shape().actions();
+    const bool any_on_sphere = std::any_of(modes_.begin(), modes_.end(), [](auto mode) { return mode != 0; });
+    if (!loop_.parameters().strategy.robust) {
+      std::fill_n(values, n, -1.0);
+      return 0;
+    }
+    loop_.weight_norms(state, norm2_.data());
+    if (any_on_sphere) {
+      input_.values(t, d_ext_.data());
+      loop_.evaluate(t, state, d_ext_.data(), modes_, signals_, rate_.data());
+    }
+    for (int p = 0; p < n; ++p) {
+      const Real value = modes_[at(p)] != 0 ? -signals_.error[at(p)] * signals_.network[at(p)]
+                                            : norm2_[at(p)] / loop_.parameters().rbf.W_max - 1.0;
+      values[p] = event_values_[at(p)] = value == 0.0 ? -1e-100 : value;
+    }
+    return 0;
+  });
+}
+
+int Integrator::Implementation::newton_matrix(Real t, const Real* state, Real gamma) noexcept {
+  return guarded([&] {
+    input_.values(t, d_ext_.data());
+    loop_.evaluate(t, state, d_ext_.data(), modes_, signals_, rate_.data());
+    jacobian_.linearize(state, signals_, modes_);
+    ++newton_setups_;
+    return newton_->factor(jacobian_, gamma) ? 0 : 1;
+  });
+}
+
+int Integrator::Implementation::solve_newton(N_Vector x, N_Vector b) noexcept {
+  return guarded([&] {
+    if (x != b) std::copy_n(NV_DATA_S(b), size_, NV_DATA_S(x));
+    newton_->solve(NV_DATA_S(x));
+    ++newton_solves_;
+    return 0;
+  });
+}
+
+void Integrator::Implementation::fail(int flag, Real t) {
+  if (failure_) std::rethrow_exception(std::exchange(failure_, nullptr));
+  std::unique_ptr<char, decltype(&std::free)> name(CVodeGetReturnFlagName(flag), &std::free);
+  throw IntegrationError("the integration stopped at t = " + in_seconds(t) + ": " +
+                         (message_.empty() ? std::string(name.get()) : message_));
+}
+
+/// Makes CVODE begin at the restart point, as a new solver would.
+void Integrator::Implementation::begin_at_restart_point() {
+  std::copy(restart_state_.begin(), restart_state_.end(), NV_DATA_S(vector_.get()));
+  modes_ = restart_modes_;
+  steps_since_restart_ = 0;
+  event_pending_ = false;
+  internal_time_ = restart_time_;
+  newton_setups_ = restart_statistics_.newton_setups;
+  newton_solves_ = restart_statistics_.newton_solves;
+  message_.clear();
+  const int flag = CVodeReInit(cvode_.get(), restart_time_, vector_.get());
+  if (flag < 0) fail(flag, restart_time_);
+}
+
+/// The state as it is seen from outside: projected, and never further out than the bound allows.
+void Integrator::Implementation::settle(Real* state) {
+  if (!loop_.parameters().strategy.robust) return;
+  loop_.weight_norms(state, norm2_.data());
+  for (const Real norm2 : norm2_) {
+    largest_raw_excess_ = std::max(largest_raw_excess_, norm2 / loop_.parameters().rbf.W_max - 1.0);
+  }
+  loop_.project(modes_, state);
+}
+
+void Integrator::Implementation::start(Real t, Tolerances tolerances) {
+  tolerances_ = tolerances;
+  restart_statistics_ = {};
+  largest_raw_excess_ = 0.0;
+  time_ = t;
+  loop_.initial_state(state_.data());
+  std::fill(modes_.begin(), modes_.end(), std::uint8_t{0});
+  steps_since_restart_ = 0;
+  internal_time_ = t;
+  restart_time_ = t;
+  newton_setups_ = newton_solves_ = 0;
+  jacobian_.refresh();
+  newton_->refresh(jacobian_);
+  if (rate(t, state_.data(), rate_.data()) != 0) fail(CV_RHSFUNC_FAIL, t);
+  loop_.weight_norms(state_.data(), norm2_.data());
+  loop_.resolve_modes(norm2_.data(), signals_, modes_);
+  restart_state_ = state_;
+  restart_modes_ = modes_;
+  begin_at_restart_point();
+}
+
+void Integrator::Implementation::restart(bool parameters_changed) {
+  restart_statistics_ = statistics();
+  if (parameters_changed) {
+    jacobian_.refresh();
+    newton_->refresh(jacobian_);
+  }
+  if (rate(time_, state_.data(), rate_.data()) != 0) fail(CV_RHSFUNC_FAIL, time_);
+  loop_.weight_norms(state_.data(), norm2_.data());
+  // a column on the sphere lies there to rounding; only its direction can have changed
+  loop_.resolve_modes(norm2_.data(), signals_, modes_);
+  restart_time_ = time_;
+  restart_state_ = state_;
+  restart_modes_ = modes_;
+  begin_at_restart_point();
+}
+
+void Integrator::Implementation::take_step() {
+  Real t = internal_time_;
+  const Real before = internal_time_;
+  // CVODE derives its first step from the distance to the output time, so that must not depend on the caller
+  const Real horizon = restart_time_ + std::max(1.0, 1e-3 * std::fabs(restart_time_));
+  const int flag = CVode(cvode_.get(), horizon, vector_.get(), &t, CV_ONE_STEP);
+  if (flag < 0) fail(flag, internal_time_);
+  ++steps_since_restart_;
+  CVodeGetCurrentTime(cvode_.get(), &internal_time_);
+  if (!(internal_time_ > before)) {
+    throw IntegrationError("the integration stopped at t = " + in_seconds(before) +
+                           ": the step size fell below the resolution of time");
+  }
+  std::fill(event_columns_.begin(), event_columns_.end(), 0);
+  if (flag == CV_ROOT_RETURN) {
+    event_pending_ = true;
+    event_time_ = t;
+    CVodeGetRootInfo(cvode_.get(), event_columns_.data());
+    return;
+  }
+  // A column may end its mode without a change of sign that CVODE can see, when it begins a step past the threshold by
+  // rounding: its mode then changes here.
+  for (std::size_t p = 0; p < event_values_.size(); ++p) {
+    if (event_values_[p] > 0.0) {
+      event_columns_[p] = 1;
+      event_pending_ = true;
+      event_time_ = internal_time_;
+    }
+  }
+}
+
+/// Handles the pending event at its time: a restart with the new modes.
+void Integrator::Implementation::change_modes(Real t) {
+  Statistics so_far = statistics();
+  AlignedVector& state = restart_state_;
+  interpolate(t, state.data());
+  settle(state.data());
+  if (rate(t, state.data(), rate_.data()) != 0) fail(CV_RHSFUNC_FAIL, t);
+  for (std::size_t p = 0; p < modes_.size(); ++p) {
+    if (event_columns_[p] == 0) continue;
+    const bool outward = signals_.error[p] * signals_.network[p] >= 0.0;
+    const std::uint8_t mode = modes_[p] == 0 && outward ? 1 : 0;
+    so_far.events += mode != modes_[p] ? 1 : 0;
+    modes_[p] = mode;
+  }
+  loop_.project(modes_, state.data());
+  restart_statistics_ = so_far;
+  restart_time_ = t;
+  restart_modes_ = modes_;
+  begin_at_restart_point();
+}
+
+void Integrator::Implementation::interpolate(Real t, Real* state) {
+  if (steps_since_restart_ == 0) {
+    std::copy(restart_state_.begin(), restart_state_.end(), state);
+    return;
+  }
+  const int flag = CVodeGetDky(cvode_.get(), t, 0, vector_.get());
+  if (flag < 0) fail(flag, t);
+  std::copy_n(NV_DATA_S(vector_.get()), size_, state);
+}
+
+void Integrator::Implementation::present(Real t) {
+  interpolate(t, state_.data());
+  if (steps_since_restart_ != 0) settle(state_.data());
+  time_ = t;
+}
+
+void Integrator::Implementation::advance(Real t_end) {
+  while (true) {
+    if (event_pending_ && event_time_ <= t_end) {
+      change_modes(event_time_);
+    } else if (internal_time_ >= t_end) {
+      break;
+    } else {
+      take_step();
+    }
+  }
+  present(t_end);
+}
+
+Statistics Integrator::Implementation::statistics() const {
+  Statistics statistics = restart_statistics_;
+  long steps = 0;
+  long evaluations = 0;
+  if (steps_since_restart_ != 0) {
+    CVodeGetNumSteps(cvode_.get(), &steps);
+    CVodeGetNumRhsEvals(cvode_.get(), &evaluations);
+  }
+  statistics.steps += steps;
+  statistics.rate_evaluations += evaluations;
+  statistics.newton_setups = newton_setups_;
+  statistics.newton_solves = newton_solves_;
+  return statistics;
+}
+
+Checkpoint Integrator::Implementation::checkpoint() const {
+  return {restart_time_, restart_state_, restart_modes_, restart_statistics_, steps_since_restart_, time_};
+}
+
+void Integrator::Implementation::restore(const Checkpoint& checkpoint, Tolerances tolerances) {
+  tolerances_ = tolerances;
+  restart_time_ = checkpoint.restart_time;
+  restart_state_ = checkpoint.restart_state;
+  restart_modes_ = checkpoint.restart_modes;
+  restart_statistics_ = checkpoint.restart_statistics;
+  jacobian_.refresh();
+  newton_->refresh(jacobian_);
+  begin_at_restart_point();
+  while (steps_since_restart_ < checkpoint.steps_since_restart) take_step();
+  present(checkpoint.time);
+}
+
+Integrator::Integrator(const ClosedLoop& loop, const ExternalDisturbance& input,
+                       std::unique_ptr<NewtonSolver> newton_solver)
+    : implementation_(std::make_unique<Implementation>(loop, input, std::move(newton_solver))) {}
+Integrator::~Integrator() = default;
+
+void Integrator::start(Real t, Tolerances tolerances) { implementation_->start(t, tolerances); }
+void Integrator::restart(bool parameters_changed) { implementation_->restart(parameters_changed); }
+void Integrator::advance(Real t_end) { implementation_->advance(t_end); }
+Real Integrator::time() const { return implementation_->time(); }
+const Real* Integrator::state() const { return implementation_->state(); }
+const Modes& Integrator::modes() const { return implementation_->modes(); }
+Statistics Integrator::statistics() const { return implementation_->statistics(); }
+Real Integrator::largest_raw_excess() const { return implementation_->largest_raw_excess(); }
+Checkpoint Integrator::checkpoint() const { return implementation_->checkpoint(); }
+void Integrator::restore(const Checkpoint& checkpoint, Tolerances tolerances) {
+  implementation_->restore(checkpoint, tolerances);
+}
+
+}  // namespace mixed_order_game

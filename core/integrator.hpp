@@ -1,0 +1,78 @@
+// Integrates the closed loop by CVODE (BDF, Newton), with the projection's events located and never stepped over.
+//
+// CVODE takes its internal steps one by one and outputs are interpolated, so the sequence of internal steps depends on
+// nothing but the last restart point (time, state, modes, parameters, inputs): communication points leave no trace, and
+// a checkpoint is that restart point plus the count of steps since.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+
+#include "closed_loop.hpp"
+#include "external_disturbance.hpp"
+#include "newton_solver.hpp"
+
+namespace mixed_order_game {
+
+struct Tolerances {
+  Real relative = 1e-6;
+  Real absolute = 1e-8;
+};
+
+/// Work done since the start of the run.
+struct Statistics {
+  std::int64_t steps = 0;
+  std::int64_t rate_evaluations = 0;
+  std::int64_t newton_setups = 0;
+  std::int64_t newton_solves = 0;
+  std::int64_t events = 0;  ///< columns that entered or left the sphere
+  friend bool operator==(const Statistics&, const Statistics&) = default;
+};
+
+/// All that is needed to continue a run bit for bit, besides parameters and inputs.
+struct Checkpoint {
+  Real restart_time = 0.0;
+  AlignedVector restart_state;
+  Modes restart_modes;
+  Statistics restart_statistics;
+  std::int64_t steps_since_restart = 0;
+  Real time = 0.0;  ///< communication point at which it was taken
+};
+
+class Integrator {
+ public:
+  /// The loop and the input are read at every evaluation and must outlive the integrator.
+  Integrator(const ClosedLoop& loop, const ExternalDisturbance& input,
+             std::unique_ptr<NewtonSolver> newton_solver);
+  ~Integrator();
+  Integrator(const Integrator&) = delete;
+  Integrator& operator=(const Integrator&) = delete;
+
+  /// Begins a run at time t with the loop's initial state.
+  void start(Real t, Tolerances tolerances);
+
+  /// Restarts at the present time because parameters, or only inputs, changed.
+  void restart(bool parameters_changed = true);
+
+  /// Moves to time t_end >= time(). Throws IntegrationError with the time reached and the reason; the present time and
+  /// state then remain those of the last success.
+  void advance(Real t_end);
+
+  [[nodiscard]] Real time() const;
+  /// State at time(), projected; every output belongs to it.
+  [[nodiscard]] const Real* state() const;
+  [[nodiscard]] const Modes& modes() const;
+  [[nodiscard]] Statistics statistics() const;
+  /// Largest excess of w'w over W_max that projection removed since the start, relative to W_max.
+  [[nodiscard]] Real largest_raw_excess() const;
+
+  [[nodiscard]] Checkpoint checkpoint() const;
+  /// Returns to a checkpoint by restarting at its restart point and repeating its steps.
+  void restore(const Checkpoint& checkpoint, Tolerances tolerances);
+
+ private:
+  class Implementation;
+  std::unique_ptr<Implementation> implementation_;
+};
+
+}  // namespace mixed_order_game

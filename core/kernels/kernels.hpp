@@ -1,0 +1,98 @@
+// The inner loops of the closed loop, of its Newton solver and of CVODE's vectors, as one table of functions.
+//
+// The same source is compiled for several x86-64 levels and the best one that the processor has is chosen when the
+// library is loaded. No level contracts a * b + c, and every sum has a fixed order, so all levels give the same bits.
+#pragma once
+
+#include <cstdint>
+
+namespace mixed_order_game {
+
+/// Neighbours of each player with their edge weights a_ik, as compressed rows.
+struct NeighbourRows {
+  const int* start;
+  const int* neighbour;
+  const double* weight;
+};
+
+/// Pattern of the Cholesky factors of all estimate blocks; see EstimateBlocks.
+struct BlockPattern {
+  int players;
+  const int* start;   ///< column k of L: entries start[k] .. start[k + 1] - 1
+  const int* row;     ///< their rows, in elimination order
+  const int* order;   ///< order[k] is the player eliminated k-th
+  const int* target;  ///< for each column the factor entries that its pairs of rows update, see factor_blocks
+};
+
+struct Kernels {
+  const char* level;  ///< name of the instruction set
+
+  // elementary functions: out may be the input
+  void (*exponential)(int n, const double* a, double* out);
+  /// out = amplitude * tanh(sharpness * a)
+  void (*scaled_tanh)(int n, double amplitude, double sharpness, const double* a, double* out);
+  /// d = bias + amplitude * sin(frequency * t + phase)
+  void (*sinusoid)(int n, double t, const double* amplitude, const double* frequency, const double* phase,
+                   const double* bias, double* d);
+
+  // closed loop; n = N D entries in a row
+  /// S_m(y_i) for centres c_m (1, ..., 1): activation[m * n + entry(i, l)], equal for every l.
+  /// exponent is scratch of N q numbers and 7 more.
+  void (*activations_diagonal)(int players, int dimension, int neurons, const double* centers, double width,
+                               const double* y, double* exponent, double* activation);
+  /// The same for centres that are vectors: center m is the row centers + m * n.
+  void (*activations_general)(int players, int dimension, int neurons, const double* centers, double width,
+                              const double* y, double* exponent, double* activation);
+  /// y_ij' = -k3 (sum_k a_ik (y_ij - y_kj) + a_ij (y_ij - xbar_j))
+  void (*estimate_rates)(int players, int dimension, NeighbourRows graph, double k3, const double* y,
+                         const double* xbar, double* rate);
+  /// sum[p] = sum over m of a[m * n + p] * b[m * n + p]
+  void (*column_products)(int n, int rows, const double* a, const double* b, double* sum);
+  /// W' = beta e (S - radial W), row by row; radial[p] is 0 inside and w'S / W_max on the sphere.
+  void (*weight_rates)(int n, int neurons, double beta, const double* e, const double* radial,
+                       const double* activation, const double* weights, double* rate);
+  /// sum and sum of squares of n numbers
+  void (*moments)(int n, const double* a, double* sum, double* sum_of_squares);
+  double (*dot)(int n, const double* a, const double* b);
+
+  // Newton solver
+  /// L D L' of N blocks at once; see EstimateBlocks.
+  void (*factor_blocks)(BlockPattern pattern, double* lower, double* diagonal);
+  /// Solves all blocks for right-hand sides of `width` coordinates, in place: rows of width * N entries.
+  void (*solve_blocks)(BlockPattern pattern, int width, const double* lower, const double* inverse_diagonal,
+                       double* rhs);
+  /// Row-major LU with partial pivoting, in place; false when a pivot is zero or not finite.
+  bool (*lu_factor)(int n, double* matrix, int* pivot);
+  void (*lu_solve)(int n, const double* matrix, const int* pivot, double* rhs);
+  /// Sums over m of S^2, c S^2 and c w S for each column; for centres that are numbers c.
+  void (*network_moments)(int n, int neurons, const double* centers, const double* activation, const double* weights,
+                          double* squares, double* centered_squares, double* centered_products);
+  /// S_change = S (-2 / rho^2) (along - c_m across), row by row; along and across per column.
+  void (*activation_changes)(int n, int neurons, const double* centers, double factor, const double* activation,
+                             const double* along, const double* across, double* change);
+  /// dy_ij = dy_ij + gain_ij dxbar_j
+  void (*add_shared_signal)(int players, int dimension, const double* gain, const double* shared, double* y);
+  /// rhs = scale rhs + from_error S + from_activation S_change + onto_weight W; coefficients per column.
+  void (*weight_corrections)(int n, int neurons, const double* scale, const double* from_error,
+                             const double* from_activation, const double* onto_weight, const double* activation,
+                             const double* activation_change, const double* weights, double* rhs);
+
+  // vectors
+  void (*linear_sum)(std::int64_t n, double a, const double* x, double b, const double* y, double* z);
+  void (*scale)(std::int64_t n, double c, const double* x, double* z);
+  void (*fill)(std::int64_t n, double c, double* z);
+  /// 1 / (relative |y| + absolute)
+  void (*error_weights)(std::int64_t n, double relative, double absolute, const double* y, double* weight);
+  /// sum of (x w)^2
+  double (*weighted_square_sum)(std::int64_t n, const double* x, const double* w);
+  double (*max_norm)(std::int64_t n, const double* x);
+};
+
+/// The best table for this processor; constant for the life of the process.
+const Kernels& kernels();
+
+/// Every table that this processor can run, the baseline first: for tests and benchmarks.
+int kernel_level_count();
+const Kernels& kernels_of_level(int level);
+
+}  // namespace mixed_order_game

@@ -1,0 +1,58 @@
+// All kernels for one instruction set: compiled once for each level with MIXED_ORDER_GAME_LEVEL naming its table.
+//
+// Nothing from the standard library's templates may be used here: an inline function compiled with wide instructions
+// could be picked by the linker for callers on every processor.
+#include "kernels.hpp"
+
+#include <math.h>
+
+#define MIXED_ORDER_GAME_TEXT_OF(name) #name
+#define MIXED_ORDER_GAME_TEXT(name) MIXED_ORDER_GAME_TEXT_OF(name)
+#define MIXED_ORDER_GAME_JOIN_OF(a, b) a##b
+#define MIXED_ORDER_GAME_JOIN(a, b) MIXED_ORDER_GAME_JOIN_OF(a, b)
+
+namespace mixed_order_game {
+
+extern const Kernels MIXED_ORDER_GAME_JOIN(kernels_, MIXED_ORDER_GAME_LEVEL);
+
+namespace {
+
+#include "elementary.ipp"
+#include "rbf_network.ipp"
+#include "estimate_dynamics.ipp"
+#include "adaptation.ipp"
+#include "estimate_blocks.ipp"
+#include "dense_lu.ipp"
+#include "vector_operations.ipp"
+
+}  // namespace
+
+const Kernels MIXED_ORDER_GAME_JOIN(kernels_, MIXED_ORDER_GAME_LEVEL) = {
+    MIXED_ORDER_GAME_TEXT(MIXED_ORDER_GAME_LEVEL),
+    exponential,
+    scaled_tanh,
+    sinusoid,
+    activations_diagonal,
+    activations_general,
+    estimate_rates,
+    column_products,
+    weight_rates,
+    moments,
+    dot,
+    factor_blocks,
+    solve_blocks,
+    lu_factor,
+    lu_solve,
+    network_moments,
+    activation_changes,
+    add_shared_signal,
+    weight_corrections,
+    linear_sum,
+    scale,
+    fill,
+    error_weights,
+    weighted_square_sum,
+    max_norm,
+};
+
+}  // namespace mixed_order_game

@@ -1,0 +1,66 @@
+// The vector operations that CVODE spends its time in; part of level.cpp.
+
+void linear_sum(std::int64_t n, double a, const double* x, double b, const double* y, double* z) {
+  // z may be x or y. The cases follow from exactness: a x - a y is computed as a (x - y), which vanishes for x = y.
+  if (b == 1.0 && a == 1.0) {
+    for (std::int64_t k = 0; k < n; ++k) z[k] = x[k] + y[k];
+  } else if (a == 1.0 && b == -1.0) {
+    for (std::int64_t k = 0; k < n; ++k) z[k] = x[k] - y[k];
+  } else if (a == -1.0 && b == 1.0) {
+    for (std::int64_t k = 0; k < n; ++k) z[k] = y[k] - x[k];
+  } else if (b == 1.0) {
+    for (std::int64_t k = 0; k < n; ++k) z[k] = a * x[k] + y[k];
+  } else if (a == 1.0) {
+    for (std::int64_t k = 0; k < n; ++k) z[k] = x[k] + b * y[k];
+  } else if (a == b) {
+    for (std::int64_t k = 0; k < n; ++k) z[k] = a * (x[k] + y[k]);
+  } else if (a == -b) {
+    for (std::int64_t k = 0; k < n; ++k) z[k] = a * (x[k] - y[k]);
+  } else {
+    for (std::int64_t k = 0; k < n; ++k) z[k] = a * x[k] + b * y[k];
+  }
+}
+
+void scale(std::int64_t n, double c, const double* x, double* z) {
+  if (c == 1.0) {
+    if (x != z) __builtin_memcpy(z, x, static_cast<unsigned long>(n) * sizeof(double));
+    return;
+  }
+  for (std::int64_t k = 0; k < n; ++k) z[k] = c * x[k];
+}
+
+void fill(std::int64_t n, double c, double* z) {
+  for (std::int64_t k = 0; k < n; ++k) z[k] = c;
+}
+
+void error_weights(std::int64_t n, double relative, double absolute, const double* __restrict y,
+                   double* __restrict weight) {
+  for (std::int64_t k = 0; k < n; ++k) weight[k] = 1.0 / (relative * fabs(y[k]) + absolute);
+}
+
+double weighted_square_sum(std::int64_t n, const double* x, const double* w) {
+  Lanes sums = {};
+  Lanes others = {};
+  std::int64_t k = 0;
+  for (; k + 2 * lane_count <= n; k += 2 * lane_count) {
+    const Lanes product = load(x + k) * load(w + k);
+    const Lanes another = load(x + k + lane_count) * load(w + k + lane_count);
+    sums += product * product;
+    others += another * another;
+  }
+  for (; k < n; k += lane_count) {
+    const int count = n - k < lane_count ? static_cast<int>(n - k) : lane_count;
+    const Lanes product = load_part(count, x + k) * load_part(count, w + k);
+    sums += product * product;
+  }
+  return total(sums + others);
+}
+
+double max_norm(std::int64_t n, const double* x) {
+  double largest = 0.0;
+  for (std::int64_t k = 0; k < n; ++k) {
+    const double size = fabs(x[k]);
+    largest = size > largest ? size : largest;  // a NaN is left to the error test
+  }
+  return largest;
+}

@@ -1,0 +1,50 @@
+// The Jacobian of the closed loop with respect to its state, kept as the few numbers that it is made of.
+#pragma once
+
+#include "closed_loop.hpp"
+
+namespace mixed_order_game {
+
+/// One entry of a sparse matrix.
+struct MatrixEntry {
+  int row;
+  int column;
+  Real value;
+};
+
+class LoopJacobian {
+ public:
+  explicit LoopJacobian(const ClosedLoop& loop);
+
+  /// Takes over changed parameters and their sparsity patterns.
+  void refresh();
+
+  /// Linearizes at a state; signals are those of ClosedLoop::evaluate at the same time, state and modes.
+  void linearize(const Real* state, const Signals& signals, const Modes& modes);
+
+  /// product = J vector, both of the state's length.
+  void multiply(const Real* vector, Real* product) const;
+
+  /// All entries that may differ from zero, each position once; the matrix of multiply(), written out entry by entry.
+  /// With coupled = false the derivatives of the activations with respect to the estimates are left out.
+  [[nodiscard]] std::vector<MatrixEntry> entries(bool coupled) const;
+
+  [[nodiscard]] const ClosedLoop& loop() const { return *loop_; }
+
+  /// The numbers it is made of, indexed by entry(i, l) unless said otherwise.
+  AlignedVector estimates;   ///< y
+  AlignedVector weights;     ///< W
+  AlignedVector activation;  ///< S
+  AlignedVector error;       ///< e
+  AlignedVector network;     ///< w'S
+  AlignedVector slope;       ///< d phi / d e
+  AlignedVector inverse_bound;  ///< 1 / W_max on the sphere, else 0
+  AlignedVector hessian;     ///< along Cost::hessian_pattern()
+  AlignedVector dynamics;    ///< along UnknownDynamics::jacobian_pattern(); zero when not perturbed
+
+ private:
+  const ClosedLoop* loop_;
+  mutable AlignedVector scratch_;
+};
+
+}  // namespace mixed_order_game

@@ -1,0 +1,17 @@
+// Numbers that say how far a state is from the equilibrium and from consensus.
+#pragma once
+
+#include "closed_loop.hpp"
+
+namespace mixed_order_game {
+
+/// 2-norm of x - x*; x and x_star of length N D.
+Real nash_error(const Real* x, const Real* x_star, int entries);
+
+/// 2-norm of all y_ij - xbar_j; signals as of this state.
+Real consensus_error(const ClosedLoop& loop, const Real* state, const Signals& signals);
+
+/// 2-norm of (grad_1 f_1(x), ..., grad_N f_N(x)).
+Real gradient_norm(const ClosedLoop& loop, const Real* x);
+
+}  // namespace mixed_order_game

@@ -1,0 +1,62 @@
+// Every number that a run of the closed loop depends on besides its state, its inputs and time.
+#pragma once
+
+#include <vector>
+
+#include "cloned.hpp"
+#include "communication_graph.hpp"
+#include "cost.hpp"
+#include "disturbance.hpp"
+#include "types.hpp"
+#include "unknown_dynamics.hpp"
+
+namespace mixed_order_game {
+
+struct Gains {
+  Real k1 = 0.0;       ///< regulation of first-order players, 1/s
+  Real k2 = 0.0;       ///< gradient step
+  Real k3 = 0.0;       ///< consensus, 1/s
+  Real k4 = 0.0;       ///< velocity feedback of second-order players, 1/s
+  Real beta = 0.0;     ///< adaptation
+  Real delta = 0.0;    ///< amplitude of the robust term
+  Real epsilon = 0.0;  ///< width of the robust term
+};
+
+struct Strategy {
+  bool robust = true;     ///< network and robust term in the control (Theorem 1); without them, Theorem 2
+  bool perturbed = true;  ///< unknown dynamics and disturbance in the plant
+};
+
+struct RbfNetwork {
+  bool diagonal = true;       ///< centre m is c_m (1, ..., 1)
+  std::vector<Real> centers;  ///< q numbers c_m, or q rows of N D entries in the order of a joint action
+  Real width = 0.0;           ///< rho
+  Real W_max = 0.0;           ///< bound of w'w for each weight column
+};
+
+/// Initial state; the weights start at zero.
+struct InitialState {
+  std::vector<Real> x;          ///< entry(i, l)
+  std::vector<Real> reference;  ///< z0 (order 1) or v0 (order 2) at entry(i, l)
+  std::vector<Real> y;          ///< i * N D + entry(j, l)
+};
+
+struct Parameters {
+  Shape shape;
+  Gains gains;
+  Strategy strategy;
+  RbfNetwork rbf;
+  CommunicationGraph graph;
+  Cloned<Cost> cost;
+  Cloned<UnknownDynamics> dynamics;
+  Cloned<Disturbance> disturbance;
+  InitialState initial;
+
+  /// Rebuilds what is derived from coefficients; called after any of them changed.
+  void refresh() {
+    graph.refresh();
+    cost->refresh();
+  }
+};
+
+}  // namespace mixed_order_game

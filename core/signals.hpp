@@ -1,0 +1,42 @@
+// The variables inside the closed loop at one instant, and the projection modes that they depend on.
+#pragma once
+
+#include <cstdint>
+
+#include "aligned_vector.hpp"
+#include "types.hpp"
+
+namespace mixed_order_game {
+
+/// Mode of each weight column: 0 inside (w'w < W_max), 1 on the sphere (w'w = W_max and e w'S >= 0).
+using Modes = std::vector<std::uint8_t>;
+
+/// Filled by ClosedLoop::evaluate. Vectors are indexed by entry(i, l) unless said otherwise.
+struct Signals {
+  explicit Signals(const Shape& shape)
+      : shared(at(shape.actions())),
+        gradient(at(shape.actions())),
+        error(at(shape.actions())),
+        network(at(shape.actions())),
+        robust(at(shape.actions())),
+        dynamics(at(shape.actions())),
+        disturbance(at(shape.actions())),
+        control(at(shape.actions())),
+        radial(at(shape.actions())),
+        exponent(at(shape.players) * at(shape.neurons) + 8),
+        activation(at(shape.actions()) * at(shape.neurons)) {}
+
+  AlignedVector shared;       ///< xbar: z (order 1) or x (order 2)
+  AlignedVector gradient;     ///< grad_i f_i(y_i)
+  AlignedVector error;        ///< e
+  AlignedVector network;      ///< w'S
+  AlignedVector robust;       ///< phi
+  AlignedVector dynamics;     ///< g(x)
+  AlignedVector disturbance;  ///< d(t) and external disturbance
+  AlignedVector control;      ///< u
+  AlignedVector radial;       ///< w'S / W_max on the sphere, else 0
+  AlignedVector exponent;     ///< scratch
+  AlignedVector activation;   ///< S_m(y_i) at m * N D + entry(i, l)
+};
+
+}  // namespace mixed_order_game

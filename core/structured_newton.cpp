@@ -1,0 +1,377 @@
+// Solves (I - gamma J) delta = b by eliminating, in this order:
+//
+//  1. the weights, column by column: w' = beta e (S - r w) enters the rest only through w'S, so that
+//         d(w'S) = h + A de + kappa' dS      with scalars h, A and a vector kappa for each column;
+//  2. the estimates: dy_i = B^-1 b + T_i dxbar by EstimateBlocks;
+//  3. velocities and references, which follow from the actions.
+//
+// What remains is a core system of at most 2 N D unknowns: dxbar, and dx of the first-order players. Its rows are
+// sparse except for kappa' dS: the activations see y_i through |y_i|^2 and the sum of its entries (or its products with
+// the centres), so that part is of low rank for each player.
+#include <algorithm>
+
+#include "core_system.hpp"
+#include "estimate_blocks.hpp"
+#include "kernels/kernels.hpp"
+#include "newton_solver.hpp"
+
+namespace mixed_order_game {
+
+namespace {
+
+class StructuredNewton final : public NewtonSolver {
+ public:
+  explicit StructuredNewton(bool coupled) : coupled_(coupled) {}
+
+  void refresh(const LoopJacobian& jacobian) override;
+  bool factor(const LoopJacobian& jacobian, Real gamma) override;
+  void solve(Real* b) override;
+
+ private:
+  void factor_weights();
+  void factor_core();
+  void accumulate_functionals(const Real* dy);
+  void apply_functionals(const Real* functionals, Real* product) const;
+
+  [[nodiscard]] const ClosedLoop& loop() const { return jacobian_->loop(); }
+  /// The activations' derivatives take part.
+  [[nodiscard]] bool coupled() const { return coupled_ && loop().parameters().strategy.robust; }
+
+  bool coupled_;
+  const LoopJacobian* jacobian_ = nullptr;
+  Real gamma_ = 0.0;
+  EstimateBlocks blocks_;
+  std::unique_ptr<CoreSystem> core_;
+
+  // sizes
+  int n_ = 0;                     // N D
+  int functional_count_ = 0;      // K: how many numbers the activations of one player depend on
+  std::vector<std::uint8_t> second_;  // per entry: order 2
+  std::vector<int> first_order_;      // per entry: number of dx in the core system, -1 for order 2
+
+  // weights; all per column p
+  AlignedVector stiffness_;     // k1 or k4, plus d phi/d e, plus A
+  AlignedVector inverse_a2_;    // h = S'b / a2
+  AlignedVector inverse_a1_;
+  AlignedVector squares_;       // |S|^2
+  AlignedVector scratch_;       // 2 n
+  AlignedVector sensitivity_;   // kappa'dS = sum_k sensitivity[k * n + p] functional[k * n + p]
+  AlignedVector weight_sensitivity_;  // w'dS likewise
+  AlignedVector zeros_, ones_;
+
+  // one solve
+  AlignedVector functionals_;   // k * n + p: functional k of the player of p
+  AlignedVector network_rhs_;   // h
+  AlignedVector core_rhs_;
+  AlignedVector shared_;        // dxbar
+  AlignedVector gradient_;      // Hessian rows times dy
+  AlignedVector from_error_, from_activation_, onto_weight_;
+  AlignedVector activation_change_;
+};
+
+void StructuredNewton::refresh(const LoopJacobian& jacobian) {
+  jacobian_ = &jacobian;
+  const Parameters& parameters = loop().parameters();
+  const Shape& shape = parameters.shape;
+  n_ = shape.actions();
+  blocks_.analyse(parameters.graph);
+  functional_count_ = parameters.rbf.diagonal ? 2 : 1 + shape.neurons;
+  second_.resize(at(n_));
+  first_order_.resize(at(n_));
+  int unknowns = n_;
+  for (int p = 0; p < n_; ++p) {
+    second_[at(p)] = shape.is_second_order(shape.player_of(p)) ? 1 : 0;
+    first_order_[at(p)] = second_[at(p)] != 0 ? -1 : unknowns++;
+  }
+  const std::size_t n = at(n_);
+  const std::size_t weights = n * at(shape.neurons);
+  for (AlignedVector* vector : {&stiffness_, &inverse_a2_, &inverse_a1_, &squares_, &network_rhs_, &shared_, &gradient_,
+                                &from_error_, &from_activation_, &onto_weight_, &zeros_}) {
+    vector->assign(n, 0.0);
+  }
+  ones_.assign(at(std::max(n_, shape.neurons)), 1.0);
+  scratch_.assign(2 * n, 0.0);
+  for (AlignedVector* vector : {&sensitivity_, &weight_sensitivity_, &functionals_}) {
+    vector->assign(n * at(functional_count_), 0.0);
+  }
+  activation_change_.assign(weights, 0.0);
+  core_rhs_.assign(at(unknowns), 0.0);
+
+  // the core system's sparse pattern
+  std::vector<std::vector<int>> rows(at(unknowns));
+  const SparseRows& hessian = parameters.cost->hessian_pattern();
+  const SparseRows& dynamics = parameters.dynamics->jacobian_pattern();
+  for (int p = 0; p < n_; ++p) {
+    const int driven = second_[at(p)] != 0 ? p : first_order_[at(p)];
+    rows[at(p)].push_back(p);
+    rows[at(driven)].push_back(p);
+    rows[at(driven)].push_back(driven);
+    for (int k = hessian.start[at(p)]; k < hessian.start[at(p + 1)]; ++k) rows[at(p)].push_back(hessian.column[at(k)]);
+    for (int k = dynamics.start[at(p)]; k < dynamics.start[at(p + 1)]; ++k) {
+      const int column = dynamics.column[at(k)];
+      rows[at(driven)].push_back(second_[at(column)] != 0 ? column : first_order_[at(column)]);
+    }
+  }
+  core_ = coupled() ? make_dense_core(unknowns) : make_sparse_core(rows);
+}
+
+// Column p, with r = w'S / W_max on the sphere and 0 inside, theta = 1 / W_max or 0:
+//     a1 = 1 + gamma beta e r,  a2 = 1 + 2 gamma beta e r,
+//     S'dw = (S'b + gamma beta (|S|^2 - w'S r) de + gamma beta e (S - r w)'dS) / a2,
+//     d(w'S) = S'dw + w'dS = S'b / a2 + A de + kappa'dS,
+//     A = gamma beta (|S|^2 - w'S r) / a2,  kappa = (gamma beta e / a2) S + (1 - gamma beta e r / a2) w.
+void StructuredNewton::factor_weights() {
+  const Kernels& kernel = kernels();
+  const Parameters& parameters = loop().parameters();
+  const Gains& gains = parameters.gains;
+  const RbfNetwork& rbf = parameters.rbf;
+  const int q = parameters.shape.neurons;
+  const LoopJacobian& jacobian = *jacobian_;
+  for (int p = 0; p < n_; ++p) stiffness_[at(p)] = (second_[at(p)] != 0 ? gains.k4 : gains.k1) + jacobian.slope[at(p)];
+  if (!parameters.strategy.robust) return;
+
+  Real* centered_squares = scratch_.data();
+  Real* centered_products = centered_squares + n_;
+  kernel.network_moments(n_, q, rbf.diagonal ? rbf.centers.data() : ones_.data(), jacobian.activation.data(),
+                         jacobian.weights.data(), squares_.data(), centered_squares, centered_products);
+  const Real factor = -2.0 / (rbf.width * rbf.width);
+  for (int p = 0; p < n_; ++p) {
+    const Real s = jacobian.network[at(p)];
+    const Real r = s * jacobian.inverse_bound[at(p)];
+    const Real push = gamma_ * gains.beta * jacobian.error[at(p)];
+    inverse_a1_[at(p)] = 1.0 / (1.0 + push * r);
+    inverse_a2_[at(p)] = 1.0 / (1.0 + 2.0 * push * r);
+    stiffness_[at(p)] += gamma_ * gains.beta * (squares_[at(p)] - s * r) * inverse_a2_[at(p)];
+    if (!coupled()) continue;
+    // dS_m = factor S_m (y.dy - c_m.dy): functional 0 is y.dy; then 1.dy for diagonal centres, c_m.dy otherwise
+    const Real along_S = push * inverse_a2_[at(p)];
+    const Real along_w = 1.0 - push * r * inverse_a2_[at(p)];
+    sensitivity_[at(p)] = factor * (along_S * squares_[at(p)] + along_w * s);
+    weight_sensitivity_[at(p)] = factor * s;
+    if (rbf.diagonal) {
+      sensitivity_[at(n_ + p)] = -factor * (along_S * centered_squares[p] + along_w * centered_products[p]);
+      weight_sensitivity_[at(n_ + p)] = -factor * centered_products[p];
+    } else {
+      for (int m = 0; m < q; ++m) {
+        const Real S = jacobian.activation[at(m * n_ + p)];
+        const Real w = jacobian.weights[at(m * n_ + p)];
+        sensitivity_[at((1 + m) * n_ + p)] = -factor * S * (along_S * S + along_w * w);
+        weight_sensitivity_[at((1 + m) * n_ + p)] = -factor * S * w;
+      }
+    }
+  }
+}
+
+// Rows of the core system, B = stiffness, H the cost's Hessian rows, G the dynamics' Jacobian, T the gains of xbar:
+//   order 1:  dz + gamma k2 (H T) dz               = b_z - gamma k2 H r
+//             (1 + gamma B) dx - gamma B dz - gamma G dx + gamma kappa'dS = b_x - gamma h
+//   order 2:  dx - gamma dv = b_x and (1 + gamma B) dv + gamma (B k2 H dy + kappa'dS - G dx) = b_v - gamma h give
+//             (1 + gamma B) dx + gamma^2 (B k2 H dy + kappa'dS - G dx) = (1 + gamma B) b_x + gamma (b_v - gamma h)
+void StructuredNewton::factor_core() {
+  const Parameters& parameters = loop().parameters();
+  const Shape& shape = parameters.shape;
+  const RbfNetwork& rbf = parameters.rbf;
+  const Real k2 = parameters.gains.k2;
+  const SparseRows& hessian = parameters.cost->hessian_pattern();
+  const SparseRows& dynamics = parameters.dynamics->jacobian_pattern();
+  const AlignedVector& gain = blocks_.shared_signal_gain();
+  core_->clear();
+  for (int p = 0; p < n_; ++p) {
+    const int i = shape.player_of(p);
+    const bool second = second_[at(p)] != 0;
+    const Real B = stiffness_[at(p)];
+    const int driven = second ? p : first_order_[at(p)];
+    const Real weight = second ? gamma_ * gamma_ : gamma_;
+    const Real gradient_weight = second ? weight * B * k2 : gamma_ * k2;
+    for (int k = hessian.start[at(p)]; k < hessian.start[at(p + 1)]; ++k) {
+      const int column = hessian.column[at(k)];
+      const Real T = gain[at(i * shape.players + shape.player_of(column))];
+      core_->add(p, column, gradient_weight * jacobian_->hessian[at(k)] * T);
+    }
+    if (second) {
+      core_->add(p, p, 1.0 + gamma_ * B);
+    } else {
+      core_->add(p, p, 1.0);
+      core_->add(driven, driven, 1.0 + gamma_ * B);
+      core_->add(driven, p, -gamma_ * B);
+    }
+    for (int k = dynamics.start[at(p)]; k < dynamics.start[at(p + 1)]; ++k) {
+      const int column = dynamics.column[at(k)];
+      core_->add(driven, second_[at(column)] != 0 ? column : first_order_[at(column)],
+                 -weight * jacobian_->dynamics[at(k)]);
+    }
+    if (!coupled()) continue;
+    const Real* y = jacobian_->estimates.data() + i * n_;
+    Real* row = core_->dense_row(driven);
+    for (int k = 0; k < n_; ++k) {
+      Real sensitivity = sensitivity_[at(p)] * y[k];
+      if (rbf.diagonal) {
+        sensitivity += sensitivity_[at(n_ + p)];
+      } else {
+        for (int m = 0; m < shape.neurons; ++m) {
+          sensitivity += sensitivity_[at((1 + m) * n_ + p)] * rbf.centers[at(m * n_ + k)];
+        }
+      }
+      row[k] += weight * sensitivity * gain[at(i * shape.players + shape.player_of(k))];
+    }
+  }
+}
+
+bool StructuredNewton::factor(const LoopJacobian& jacobian, Real gamma) {
+  jacobian_ = &jacobian;
+  gamma_ = gamma;
+  factor_weights();
+  const Parameters& parameters = loop().parameters();
+  blocks_.factor(parameters.graph, gamma * parameters.gains.k3);
+  factor_core();
+  return core_->factor();
+}
+
+void StructuredNewton::accumulate_functionals(const Real* dy) {
+  const Kernels& kernel = kernels();
+  const Shape& shape = loop().shape();
+  const RbfNetwork& rbf = loop().parameters().rbf;
+  for (int i = 0; i < shape.players; ++i) {
+    const Real* change = dy + i * n_;
+    Real along = kernel.dot(n_, jacobian_->estimates.data() + i * n_, change);
+    for (int p = i; p < n_; p += shape.players) functionals_[at(p)] = along;
+    for (int k = 1; k < functional_count_; ++k) {
+      along = kernel.dot(n_, rbf.diagonal ? ones_.data() : rbf.centers.data() + (k - 1) * n_, change);
+      for (int p = i; p < n_; p += shape.players) functionals_[at(k * n_ + p)] = along;
+    }
+  }
+}
+
+void StructuredNewton::apply_functionals(const Real* sensitivity, Real* product) const {
+  kernels().column_products(n_, functional_count_, sensitivity, functionals_.data(), product);
+}
+
+void StructuredNewton::solve(Real* b) {
+  const Kernels& kernel = kernels();
+  const Parameters& parameters = loop().parameters();
+  const Shape& shape = parameters.shape;
+  const StateLayout& layout = loop().layout();
+  const bool robust = parameters.strategy.robust;
+  const Real k2 = parameters.gains.k2;
+  const SparseRows& hessian = parameters.cost->hessian_pattern();
+  const SparseRows& dynamics = parameters.dynamics->jacobian_pattern();
+  Real* dx = b + layout.x();
+  Real* dreference = b + layout.reference();
+  Real* dy = b + layout.estimates();
+  Real* dW = b + layout.weights();
+  Real* h = network_rhs_.data();
+  Real* kappa_dS = scratch_.data();
+  Real* w_dS = scratch_.data() + n_;
+
+  const auto apply_hessian = [&] {
+    for (int p = 0; p < n_; ++p) {
+      const Real* own = dy + shape.player_of(p) * n_;
+      Real sum = 0.0;
+      for (int k = hessian.start[at(p)]; k < hessian.start[at(p + 1)]; ++k) {
+        sum += jacobian_->hessian[at(k)] * own[hessian.column[at(k)]];
+      }
+      gradient_[at(p)] = sum;
+    }
+  };
+
+  // estimates and weights without the unknowns of the core
+  blocks_.solve(shape.dimension, dy);
+  apply_hessian();
+  std::fill_n(h, n_, 0.0);
+  std::fill_n(kappa_dS, n_, 0.0);
+  if (robust) {
+    kernel.column_products(n_, shape.neurons, jacobian_->activation.data(), dW, h);
+    for (int p = 0; p < n_; ++p) h[p] *= inverse_a2_[at(p)];
+    if (coupled()) {
+      accumulate_functionals(dy);
+      apply_functionals(sensitivity_.data(), kappa_dS);
+    }
+  }
+
+  // core
+  for (int p = 0; p < n_; ++p) {
+    const Real known = h[p] + kappa_dS[p];
+    const Real B = stiffness_[at(p)];
+    if (second_[at(p)] != 0) {
+      core_rhs_[at(p)] =
+          (1.0 + gamma_ * B) * dx[p] + gamma_ * (dreference[p] - gamma_ * (known + B * k2 * gradient_[at(p)]));
+    } else {
+      core_rhs_[at(p)] = dreference[p] - gamma_ * k2 * gradient_[at(p)];
+      core_rhs_[at(first_order_[at(p)])] = dx[p] - gamma_ * known;
+    }
+  }
+  core_->solve(core_rhs_.data());
+  std::copy_n(core_rhs_.begin(), n_, shared_.begin());
+
+  // back to estimates, actions, references and velocities
+  kernel.add_shared_signal(shape.players, shape.dimension, blocks_.shared_signal_gain().data(), shared_.data(), dy);
+  apply_hessian();
+  if (coupled()) {
+    accumulate_functionals(dy);
+    apply_functionals(sensitivity_.data(), kappa_dS);
+    apply_functionals(weight_sensitivity_.data(), w_dS);
+  } else {
+    std::fill_n(w_dS, n_, 0.0);
+  }
+  for (int p = 0; p < n_; ++p) {
+    dx[p] = second_[at(p)] != 0 ? shared_[at(p)] : core_rhs_[at(first_order_[at(p)])];
+  }
+  for (int p = 0; p < n_; ++p) {
+    if (second_[at(p)] == 0) {
+      dreference[p] = shared_[at(p)];
+      continue;
+    }
+    Real dg = 0.0;
+    for (int k = dynamics.start[at(p)]; k < dynamics.start[at(p + 1)]; ++k) {
+      dg += jacobian_->dynamics[at(k)] * dx[dynamics.column[at(k)]];
+    }
+    const Real B = stiffness_[at(p)];
+    dreference[p] = (dreference[p] - gamma_ * (h[p] + kappa_dS[p] + B * k2 * gradient_[at(p)] - dg)) / (1.0 + gamma_ * B);
+  }
+  if (!robust) return;
+
+  // weights: a1 dw = b + gamma beta de (S - r w) + gamma beta e dS - gamma beta e theta w (w'dS + S'dw)
+  const Real gamma_beta = gamma_ * parameters.gains.beta;
+  for (int p = 0; p < n_; ++p) {
+    const Real de = second_[at(p)] != 0 ? dreference[p] + k2 * gradient_[at(p)] : dx[p] - dreference[p];
+    const Real theta = jacobian_->inverse_bound[at(p)];
+    const Real r = jacobian_->network[at(p)] * theta;
+    const Real push = gamma_beta * jacobian_->error[at(p)];
+    const Real A = gamma_beta * (squares_[at(p)] - jacobian_->network[at(p)] * r) * inverse_a2_[at(p)];
+    const Real dnetwork = h[p] + A * de + kappa_dS[p];  // S'dw + w'dS
+    from_error_[at(p)] = gamma_beta * de * inverse_a1_[at(p)];
+    from_activation_[at(p)] = coupled() ? push * inverse_a1_[at(p)] : 0.0;
+    onto_weight_[at(p)] = -(gamma_beta * de * r + push * theta * dnetwork) * inverse_a1_[at(p)];
+  }
+  const Real* change = jacobian_->activation.data();
+  if (coupled()) {
+    change = activation_change_.data();
+    const RbfNetwork& rbf = parameters.rbf;
+    const Real factor = -2.0 / (rbf.width * rbf.width);
+    if (rbf.diagonal) {
+      kernel.activation_changes(n_, shape.neurons, rbf.centers.data(), factor, jacobian_->activation.data(),
+                                functionals_.data(), functionals_.data() + n_, activation_change_.data());
+    } else {
+      for (int m = 0; m < shape.neurons; ++m) {
+        kernel.activation_changes(n_, 1, ones_.data(), factor, jacobian_->activation.data() + m * n_,
+                                  functionals_.data(), functionals_.data() + (1 + m) * n_,
+                                  activation_change_.data() + m * n_);
+      }
+    }
+  }
+  kernel.weight_corrections(n_, shape.neurons, inverse_a1_.data(), from_error_.data(), from_activation_.data(),
+                            onto_weight_.data(), jacobian_->activation.data(), change, jacobian_->weights.data(), dW);
+}
+
+}  // namespace
+
+std::unique_ptr<NewtonSolver> make_structured_newton(bool coupled) {
+  return std::make_unique<StructuredNewton>(coupled);
+}
+
+std::unique_ptr<NewtonSolver> make_newton_solver(const Shape& shape) {
+  constexpr int largest_dense_core = 64;  // measured: beyond it the dense core costs more than the better matrix saves
+  return make_structured_newton(shape.actions() <= largest_dense_core);
+}
+
+}  // namespace mixed_order_game
