@@ -16,8 +16,7 @@ class DenseCore final : public CoreSystem {
       : unknowns_(unknowns), matrix_(at(unknowns) * at(unknowns)), pivot_(at(unknowns)) {}
 
   void clear() override { std::fill(matrix_.begin(), matrix_.end(), 0.0); }
-  void add(int row, int column, Real value) override { matrix_[at(row * unknowns_ + column)] += value; }
-  Real* dense_row(int row) override { return matrix_.data() + row * unknowns_; }
+  void add(int row, int column, Real value) override { matrix_[at(column * unknowns_ + row)] += value; }
   bool factor() override { return kernels().lu_factor(unknowns_, matrix_.data(), pivot_.data()); }
   void solve(Real* b) override { kernels().lu_solve(unknowns_, matrix_.data(), pivot_.data(), b); }
 
@@ -43,7 +42,6 @@ class SparseCore final : public CoreSystem {
 
   void clear() override { std::fill_n(matrix_.valuePtr(), matrix_.nonZeros(), 0.0); }
   void add(int row, int column, Real value) override { matrix_.coeffRef(row, column) += value; }
-  Real* dense_row(int /*row*/) override { return nullptr; }
   bool factor() override {
     lu_.factorize(matrix_);
     return lu_.info() == Eigen::Success;

@@ -15,8 +15,6 @@ class CoreSystem {
   virtual void clear() = 0;
   /// Adds to an entry; with a sparse core only where its pattern has one.
   virtual void add(int row, int column, Real value) = 0;
-  /// A row to add to directly; null when the core is sparse.
-  virtual Real* dense_row(int row) = 0;
   /// False when the matrix is numerically singular.
   virtual bool factor() = 0;
   virtual void solve(Real* b) = 0;

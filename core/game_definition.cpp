@@ -76,7 +76,8 @@ RbfNetwork read_network(const TomlEntry& rbf, const Shape& shape) {
       network.centers[at(m)] = center.number();
       continue;
     }
-    const std::string expected = "a list of " + std::to_string(n) + " numbers, player by player, as the first center is a list";
+    const std::string expected =
+        "a list of " + std::to_string(n) + " numbers, player by player, as the first center is a list";
     if (center.length(expected) != at(n)) center.fail(expected);
     for (int j = 0; j < shape.players; ++j) {
       for (int l = 0; l < shape.dimension; ++l) {
@@ -207,15 +208,15 @@ std::int64_t variable_count(const Shape& shape, bool diagonal) {
   const std::int64_t D = shape.dimension;
   const std::int64_t q = shape.neurons;
   const std::int64_t gains = 7;
-  const std::int64_t network = 2 + (diagonal ? q : 0);             // W_max, rho, center
+  const std::int64_t network = 2 + (diagonal ? q : 0);  // W_max, rho, center
   const std::int64_t graph_and_cost = N * (N - 1) / 2 + N + N * D + N * (N - 1);
   const std::int64_t dynamics_and_disturbance = N + 4 * N * D;
-  const std::int64_t switches = 3;                                 // robust, perturbed, allow_disconnected
-  const std::int64_t initial_state = 2 * N * D + N * N * D;        // x0, z0 or v0, y0
+  const std::int64_t switches = 3;                           // robust, perturbed, allow_disconnected
+  const std::int64_t initial_state = 2 * N * D + N * N * D;  // x0, z0 or v0, y0
   const std::int64_t tolerances = 2;
-  const std::int64_t states = (2 + N + q) * N * D;                 // x, z or v, y, W
-  const std::int64_t signals = 6 * N * D + N;                      // d_ext, u, x_star, W_norm2, phi, nn, cost
-  const std::int64_t measures = 3 + 3 + N;                         // errors and gradient, solver work, order
+  const std::int64_t states = (2 + N + q) * N * D;  // x, z or v, y, W
+  const std::int64_t signals = 6 * N * D + N;       // d_ext, u, x_star, W_norm2, phi, nn, cost
+  const std::int64_t measures = 3 + 3 + N;          // errors and gradient, solver work, order
   return gains + network + graph_and_cost + dynamics_and_disturbance + switches + initial_state + tolerances + states +
          signals + measures;
 }
@@ -262,8 +263,9 @@ Game parse_game(std::string_view toml) {
   QuadraticCost cost(shape.players, shape.dimension);
   std::vector<PolynomialTerm> terms;
   SinusoidalDisturbance disturbance(n);
-  InitialState initial{
-      .x = std::vector<Real>(at(n)), .reference = std::vector<Real>(at(n)), .y = std::vector<Real>(at(shape.players) * at(n))};
+  InitialState initial{.x = std::vector<Real>(at(n)),
+                       .reference = std::vector<Real>(at(n)),
+                       .y = std::vector<Real>(at(shape.players) * at(n))};
   for (int i = 0; i < shape.players; ++i) {
     const TomlEntry player = players.item(at(i));
     read_initial_state(player, i, shape, initial);

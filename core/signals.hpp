@@ -23,7 +23,7 @@ struct Signals {
         disturbance(at(shape.actions())),
         control(at(shape.actions())),
         radial(at(shape.actions())),
-        exponent(at(shape.players) * at(shape.neurons) + 8),
+        exponent(at(shape.players) * at(shape.neurons + 2) + 8),
         activation(at(shape.actions()) * at(shape.neurons)) {}
 
   AlignedVector shared;       ///< xbar: z (order 1) or x (order 2)

@@ -202,7 +202,6 @@ void StructuredNewton::factor_core() {
     }
     if (!coupled()) continue;
     const Real* y = jacobian_->estimates.data() + i * n_;
-    Real* row = core_->dense_row(driven);
     for (int k = 0; k < n_; ++k) {
       Real sensitivity = sensitivity_[at(p)] * y[k];
       if (rbf.diagonal) {
@@ -212,7 +211,7 @@ void StructuredNewton::factor_core() {
           sensitivity += sensitivity_[at((1 + m) * n_ + p)] * rbf.centers[at(m * n_ + k)];
         }
       }
-      row[k] += weight * sensitivity * gain[at(i * shape.players + shape.player_of(k))];
+      core_->add(driven, k, weight * sensitivity * gain[at(i * shape.players + shape.player_of(k))]);
     }
   }
 }

@@ -87,9 +87,8 @@ std::string value_of(const toml::node& node) {
   if (const auto* boolean = node.as_boolean()) return boolean->get() ? "true" : "false";
   if (node.is_table()) return "a table";
   if (const auto* list = node.as_array()) {
-    const bool shown = list->size() <= longest_list && std::all_of(list->begin(), list->end(), [](const auto& item) {
-                         return item.is_number();
-                       });
+    const bool shown = list->size() <= longest_list &&
+                       std::all_of(list->begin(), list->end(), [](const auto& item) { return item.is_number(); });
     if (!shown) return "a list of " + in_digits(list->size());
     std::string items;
     for (const auto& item : *list) items += (items.empty() ? "" : ", ") + value_of(item);
@@ -138,14 +137,14 @@ void TomlEntry::accept_keys(std::initializer_list<std::string_view> known) const
     if (std::find(known.begin(), known.end(), name) != known.end()) continue;
     const std::string shown = readable(name);
     const auto distance = [&](std::string_view other) { return edit_distance(shown, other); };
-    const auto* closest = std::min_element(known.begin(), known.end(), [&](std::string_view a, std::string_view b) {
-      return distance(a) < distance(b);
-    });
+    const auto* closest = std::min_element(
+        known.begin(), known.end(), [&](std::string_view a, std::string_view b) { return distance(a) < distance(b); });
     std::string expected;
     if (3 * distance(*closest) <= shown.size()) {
       expected = "the closest known key is " + std::string(*closest);
     } else {
-      for (const std::string_view other : known) expected += (expected.empty() ? "expected one of " : ", ") + std::string(other);
+      for (const std::string_view other : known)
+        expected += (expected.empty() ? "expected one of " : ", ") + std::string(other);
     }
     throw GameError("\"" + shown + "\" is an unknown key of " + (path_.empty() ? "the game definition" : path_) + ", " +
                     expected);

@@ -37,7 +37,7 @@ struct Kernels {
 
   // closed loop; n = N D entries in a row
   /// S_m(y_i) for centres c_m (1, ..., 1): activation[m * n + entry(i, l)], equal for every l.
-  /// exponent is scratch of N q numbers and 7 more.
+  /// exponent is scratch of N (q + 2) + 8 numbers.
   void (*activations_diagonal)(int players, int dimension, int neurons, const double* centers, double width,
                                const double* y, double* exponent, double* activation);
   /// The same for centres that are vectors: center m is the row centers + m * n.
@@ -61,7 +61,7 @@ struct Kernels {
   /// Solves all blocks for right-hand sides of `width` coordinates, in place: rows of width * N entries.
   void (*solve_blocks)(BlockPattern pattern, int width, const double* lower, const double* inverse_diagonal,
                        double* rhs);
-  /// Row-major LU with partial pivoting, in place; false when a pivot is zero or not finite.
+  /// Column-major LU with partial pivoting, in place; false when a pivot is zero or not finite.
   bool (*lu_factor)(int n, double* matrix, int* pivot);
   void (*lu_solve)(int n, const double* matrix, const int* pivot, double* rhs);
   /// Sums over m of S^2, c S^2 and c w S for each column; for centres that are numbers c.

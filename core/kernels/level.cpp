@@ -18,6 +18,7 @@ extern const Kernels MIXED_ORDER_GAME_JOIN(kernels_, MIXED_ORDER_GAME_LEVEL);
 namespace {
 
 #include "elementary.ipp"
+#include "sums.ipp"
 #include "rbf_network.ipp"
 #include "estimate_dynamics.ipp"
 #include "adaptation.ipp"

@@ -38,24 +38,6 @@ void error_weights(std::int64_t n, double relative, double absolute, const doubl
   for (std::int64_t k = 0; k < n; ++k) weight[k] = 1.0 / (relative * fabs(y[k]) + absolute);
 }
 
-double weighted_square_sum(std::int64_t n, const double* x, const double* w) {
-  Lanes sums = {};
-  Lanes others = {};
-  std::int64_t k = 0;
-  for (; k + 2 * lane_count <= n; k += 2 * lane_count) {
-    const Lanes product = load(x + k) * load(w + k);
-    const Lanes another = load(x + k + lane_count) * load(w + k + lane_count);
-    sums += product * product;
-    others += another * another;
-  }
-  for (; k < n; k += lane_count) {
-    const int count = n - k < lane_count ? static_cast<int>(n - k) : lane_count;
-    const Lanes product = load_part(count, x + k) * load_part(count, w + k);
-    sums += product * product;
-  }
-  return total(sums + others);
-}
-
 double max_norm(std::int64_t n, const double* x) {
   double largest = 0.0;
   for (std::int64_t k = 0; k < n; ++k) {

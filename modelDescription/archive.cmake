@@ -1,0 +1,58 @@
+# The FMU of the paper's example, made anew whenever the library, the description or any packed file changes, and the
+# files from which an installed package makes FMUs of other games.
+
+set(packaging ${PROJECT_SOURCE_DIR}/python_harness/mixed_order_game/packaging.py)
+set(game ${PROJECT_SOURCE_DIR}/modelDescription/games/five_vehicles.toml)
+set(documentation ${PROJECT_SOURCE_DIR}/modelDescription/documentation)
+set(icon ${PROJECT_SOURCE_DIR}/modelDescription/model.png)
+set(description ${PROJECT_BINARY_DIR}/fmu/modelDescription.xml)
+set(archive ${PROJECT_BINARY_DIR}/fmu/MixedOrderGame.fmu)
+
+if(CMAKE_SYSTEM_NAME STREQUAL "Linux" AND CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
+  set(platform linux64)
+else()
+  string(TOLOWER "${CMAKE_SYSTEM_PROCESSOR}-${CMAKE_SYSTEM_NAME}" platform)
+endif()
+
+# Licences of everything that is linked into the binary.
+set(licenses ${PROJECT_BINARY_DIR}/licenses)
+file(MAKE_DIRECTORY ${licenses})
+configure_file(${PROJECT_SOURCE_DIR}/LICENSE ${licenses}/mixed-order-game.txt COPYONLY)
+function(collect_license name)
+  foreach(candidate IN LISTS ARGN)
+    if(EXISTS "${candidate}")
+      configure_file("${candidate}" ${licenses}/${name}.txt COPYONLY)
+      return()
+    endif()
+  endforeach()
+  message(WARNING "no licence text found for ${name}: the FMU will lack documentation/licenses/${name}.txt")
+endfunction()
+collect_license(sundials /usr/share/doc/libsundials-dev/copyright "${sundials_SOURCE_DIR}/LICENSE")
+collect_license(eigen /usr/share/doc/libeigen3-dev/copyright "${eigen_SOURCE_DIR}/COPYING.MPL2")
+collect_license(tomlplusplus /usr/share/doc/libtomlplusplus-dev/copyright "${tomlplusplus_SOURCE_DIR}/LICENSE")
+string(REGEX MATCH "^[0-9]+" gcc_version "${CMAKE_CXX_COMPILER_VERSION}")
+collect_license(libstdc++ /usr/share/doc/libstdc++-${gcc_version}-dev/copyright
+                /usr/share/doc/gcc-${gcc_version}-base/copyright)
+
+file(GLOB_RECURSE packed CONFIGURE_DEPENDS ${documentation}/* ${licenses}/*)
+add_custom_command(
+  OUTPUT ${description}
+  COMMAND ${CMAKE_COMMAND} -E make_directory ${PROJECT_BINARY_DIR}/fmu
+  COMMAND mixed-order-game-description ${game} --output ${description}
+  DEPENDS mixed-order-game-description ${game}
+  VERBATIM)
+add_custom_command(
+  OUTPUT ${archive}
+  COMMAND ${Python_EXECUTABLE} ${packaging} --model-description ${description} --game ${game}
+          --binary ${platform}=$<TARGET_FILE:MixedOrderGame> --documentation ${documentation} --licenses ${licenses}
+          --icon ${icon} --output ${archive}
+  DEPENDS MixedOrderGame ${description} ${game} ${packaging} ${packed} ${icon}
+  VERBATIM)
+add_custom_target(fmu ALL DEPENDS ${archive})
+
+install(TARGETS MixedOrderGame LIBRARY DESTINATION mixed_order_game/_native/binaries/${platform})
+install(TARGETS mixed-order-game-description RUNTIME DESTINATION mixed_order_game/_native)
+install(DIRECTORY ${documentation}/ DESTINATION mixed_order_game/_native/documentation)
+install(DIRECTORY ${licenses}/ DESTINATION mixed_order_game/_native/licenses)
+install(FILES ${icon} DESTINATION mixed_order_game/_native)
+install(DIRECTORY ${PROJECT_SOURCE_DIR}/modelDescription/games/ DESTINATION mixed_order_game/games)

@@ -1,0 +1,198 @@
+#include "integrator.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstring>
+#include <fstream>
+#include <sstream>
+
+#include "equilibrium.hpp"
+#include "errors.hpp"
+#include "game.hpp"
+#include "random_game.hpp"
+
+namespace mixed_order_game {
+namespace {
+
+std::string text_of(const std::string& path) {
+  std::ifstream file(std::string(MIXED_ORDER_GAME_SOURCE_DIR) + "/" + path);
+  std::stringstream text;
+  text << file.rdbuf();
+  return text.str();
+}
+
+const std::string paper_game = "modelDescription/games/five_vehicles.toml";
+const std::string busy_game = "tests/reference/games/small_weight_bound.toml";  // enters and leaves the sphere often
+
+/// A loop with its input and integrator.
+struct Simulation {
+  explicit Simulation(const std::string& toml, std::unique_ptr<NewtonSolver> solver = nullptr)
+      : loop(parse_game(toml).parameters),
+        input(loop.shape().actions()),
+        integrator(loop, input, solver ? std::move(solver) : make_newton_solver(loop.shape())) {}
+
+  [[nodiscard]] std::vector<Real> state() const {
+    return {integrator.state(), integrator.state() + loop.layout().size()};
+  }
+  [[nodiscard]] Real largest_norm2() const {
+    std::vector<Real> norm2(at(loop.shape().actions()));
+    loop.weight_norms(integrator.state(), norm2.data());
+    return *std::max_element(norm2.begin(), norm2.end());
+  }
+
+  ClosedLoop loop;
+  ExternalDisturbance input;
+  Integrator integrator;
+};
+
+bool same_bits(const std::vector<Real>& a, const std::vector<Real>& b) {
+  return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(Real)) == 0;
+}
+
+TEST(Integrator, ReachesTheNeighbourhoodOfThePapersEquilibrium) {
+  Simulation run(text_of(paper_game));
+  run.integrator.start(0.0, {1e-8, 1e-10});
+  Real largest = 0.0;
+  for (int k = 1; k <= 1000; ++k) {
+    const Real t = 0.02 * k;
+    run.integrator.advance(t);
+    EXPECT_LE(run.largest_norm2(), 500.0 * (1.0 + 1e-9));
+    for (int p = 0; p < 10 && t >= 16.0; ++p) largest = std::max(largest, std::abs(run.integrator.state()[p] + 0.5));
+  }
+  EXPECT_NEAR(largest, 0.00122, 0.000005);
+  EXPECT_EQ(run.integrator.statistics().events, 22);
+}
+
+TEST(Integrator, ConvergesWhenUnperturbed) {
+  std::string game = text_of(paper_game);
+  for (const char* flag : {"robust", "perturbed"}) {
+    const std::size_t where = game.find(std::string(flag) + " = true");
+    game.replace(where, std::strlen(flag) + 7, std::string(flag) + " = false");
+  }
+  Simulation run(game);
+  run.integrator.start(0.0, {1e-8, 1e-10});
+  run.integrator.advance(3.0);
+  for (int p = 0; p < 10; ++p) EXPECT_NEAR(run.integrator.state()[p], -0.5, 1e-6);
+}
+
+TEST(Integrator, DoesNotDependOnCommunicationPoints) {
+  for (const std::string& game : {paper_game, busy_game}) {
+    std::vector<std::vector<Real>> ends;
+    Statistics statistics;
+    for (const int per_second : {64, 32, 8, 1}) {
+      Simulation run(text_of(game));
+      run.integrator.start(0.0, {1e-6, 1e-8});
+      for (int k = 1; k <= 4 * per_second; ++k) run.integrator.advance(static_cast<Real>(k) / per_second);
+      ends.push_back(run.state());
+      if (per_second == 64) statistics = run.integrator.statistics();
+      EXPECT_EQ(run.integrator.statistics(), statistics);
+    }
+    for (const auto& end : ends) EXPECT_TRUE(same_bits(end, ends.front())) << game;
+  }
+}
+
+TEST(Integrator, RestoresCheckpointsBitForBit) {
+  const Tolerances tolerances{1e-6, 1e-8};
+  for (const std::string& game : {paper_game, busy_game}) {
+    Simulation run(text_of(game));
+    run.integrator.start(0.0, tolerances);
+    std::vector<Checkpoint> checkpoints;
+    std::vector<std::vector<Real>> states;
+    std::vector<Statistics> statistics;
+    for (int k = 0; k <= 40; ++k) {
+      if (k > 0) run.integrator.advance(0.05 * k);
+      checkpoints.push_back(run.integrator.checkpoint());
+      states.push_back(run.state());
+      statistics.push_back(run.integrator.statistics());
+    }
+    for (const std::size_t from : {0U, 33U, 1U, 7U, 20U, 39U}) {
+      Simulation fresh(text_of(game));
+      for (Simulation* other : {&run, &fresh}) {
+        other->integrator.restore(checkpoints[from], tolerances);
+        EXPECT_TRUE(same_bits(other->state(), states[from])) << from;
+        for (std::size_t k = from + 1; k <= 40; ++k) {
+          other->integrator.advance(0.05 * static_cast<Real>(k));
+          ASSERT_TRUE(same_bits(other->state(), states[k])) << "from " << from << " to " << k;
+          ASSERT_EQ(other->integrator.statistics(), statistics[k]) << "from " << from << " to " << k;
+        }
+      }
+    }
+  }
+}
+
+TEST(Integrator, StructuredAndDenseSolversGiveTheSameRun) {
+  for (const std::string& game : {paper_game, busy_game}) {
+    Simulation structured(text_of(game), make_structured_newton(true));
+    Simulation uncoupled(text_of(game), make_structured_newton(false));
+    Simulation dense(text_of(game), make_dense_newton(true));
+    for (Simulation* run : {&structured, &uncoupled, &dense}) {
+      run->integrator.start(0.0, {1e-9, 1e-11});
+      run->integrator.advance(2.0);
+      for (int p = 0; p < run->loop.shape().actions(); ++p) {
+        EXPECT_NEAR(run->integrator.state()[p], structured.integrator.state()[p], 1e-6);
+      }
+    }
+  }
+}
+
+TEST(Integrator, RawExcessOfTheWeightsStaysWithinTheTolerance) {
+  for (const Real tolerance : {1e-5, 1e-7, 1e-9}) {
+    for (const std::string& game : {paper_game, busy_game}) {
+      Simulation run(text_of(game));
+      run.integrator.start(0.0, {tolerance, 0.01 * tolerance});
+      for (int k = 1; k <= 300; ++k) run.integrator.advance(0.01 * k);
+      EXPECT_LE(run.integrator.largest_raw_excess(), 10.0 * tolerance) << game;
+      EXPECT_LE(run.largest_norm2(), run.loop.parameters().rbf.W_max * (1.0 + 1e-9));
+    }
+  }
+}
+
+TEST(Integrator, ErrorFallsWithTheTolerance) {
+  Simulation exact(text_of(paper_game));
+  exact.integrator.start(0.0, {1e-12, 1e-14});
+  exact.integrator.advance(0.7);
+  Real previous = 1.0;
+  for (const Real tolerance : {1e-4, 1e-6, 1e-8, 1e-10}) {
+    Simulation run(text_of(paper_game));
+    run.integrator.start(0.0, {tolerance, 0.01 * tolerance});
+    run.integrator.advance(0.7);
+    Real error = 0.0;
+    for (int p = 0; p < 20; ++p) error = std::max(error, std::abs(run.state()[at(p)] - exact.state()[at(p)]));
+    EXPECT_LT(error, previous / 5.0) << tolerance;
+    previous = error;
+  }
+  EXPECT_LT(previous, 1e-7);
+}
+
+TEST(Integrator, AnInputActsFromTheRestartOn) {
+  Simulation run(text_of(paper_game));
+  run.integrator.start(0.0, {1e-7, 1e-9});
+  run.integrator.advance(1.0);
+  const std::vector<Real> before = run.state();
+  run.input.set_value(3, 100.0);
+  run.integrator.restart(false);
+  EXPECT_TRUE(same_bits(run.state(), before));
+  run.integrator.advance(1.001);
+  // x'' = u + g + d + d_ext of the fourth player
+  EXPECT_NEAR(run.state()[13] - before[13], 0.1, 0.02);
+}
+
+TEST(Integrator, StopsWithTheTimeReachedWhenTheSolutionEscapes) {
+  testing::PlainGame game = testing::random_game({.seed = 3, .players = 2, .dimension = 1, .neurons = 2, .robust = false});
+  game.H[0][0][0] = 50.0;  // x' = 50 x^2 + ... blows up
+  game.x0[0][0] = 30.0;
+  Simulation run(testing::toml_of(game));
+  run.integrator.start(0.0, {1e-6, 1e-8});
+  try {
+    run.integrator.advance(1.0);
+    FAIL() << "reached t = 1 s";
+  } catch (const IntegrationError& error) {
+    EXPECT_NE(std::string(error.what()).find("t = "), std::string::npos) << error.what();
+  }
+  EXPECT_EQ(run.integrator.time(), 0.0);
+  EXPECT_EQ(run.integrator.state()[0], 30.0);
+}
+
+}  // namespace
+}  // namespace mixed_order_game
