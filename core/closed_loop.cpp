@@ -22,28 +22,20 @@ void ClosedLoop::initial_state(Real* state) const {
   std::fill(state + layout_.weights(), state + layout_.size(), 0.0);
 }
 
-void ClosedLoop::evaluate(Real t, const Real* state, const Real* d_ext, const Modes& modes, Signals& signals,
-                          Real* rate) const {
+void ClosedLoop::evaluate_seeking(const Real* state, Signals& signals) const {
   const Kernels& kernel = kernels();
   const auto& [shape, gains, strategy, rbf, graph, cost, dynamics, disturbance, initial] = parameters_;
-  const int players = shape.players;
   const int n = shape.actions();
-  const int neurons = shape.neurons;
   const Real* x = state + layout_.x();
   const Real* reference = state + layout_.reference();  // z or v
   const Real* y = state + layout_.estimates();
-  const Real* W = state + layout_.weights();
   Real* e = signals.error.data();
-  Real* s = signals.network.data();
-  Real* phi = signals.robust.data();
-  Real* gradient = signals.gradient.data();
-  Real* d = signals.disturbance.data();
-  Real* g = signals.dynamics.data();
+  const Real* gradient = signals.gradient.data();
 
-  cost->own_gradients(y, n, gradient);
+  cost->own_gradients(y, n, signals.gradient.data());
   for (int l = 0; l < shape.dimension; ++l) {
-    for (int i = 0; i < players; ++i) {
-      const int p = l * players + i;
+    for (int i = 0; i < shape.players; ++i) {
+      const int p = l * shape.players + i;
       if (shape.is_second_order(i)) {
         signals.shared[at(p)] = x[p];
         e[p] = reference[p] + gains.k2 * gradient[p];  // e_i = v_i + k2 grad_i f_i(y_i)
@@ -53,24 +45,43 @@ void ClosedLoop::evaluate(Real t, const Real* state, const Real* d_ext, const Mo
       }
     }
   }
+  if (!strategy.robust) {  // the estimation module is absent
+    std::fill_n(signals.network.begin(), n, 0.0);
+    std::fill_n(signals.robust.begin(), n, 0.0);
+    return;
+  }
+  const auto activations = rbf.diagonal ? kernel.activations_diagonal : kernel.activations_general;
+  activations(shape.players, shape.dimension, shape.neurons, rbf.centers.data(), rbf.width, y, signals.exponent.data(),
+              signals.activation.data());
+  kernel.column_products(n, shape.neurons, state + layout_.weights(), signals.activation.data(),
+                         signals.network.data());
+  // phi_i = delta tanh(K delta e_i / epsilon)
+  kernel.scaled_tanh(n, gains.delta, robust_term_constant * gains.delta / gains.epsilon, e, signals.robust.data());
+}
 
+void ClosedLoop::evaluate(Real t, const Real* state, const Real* d_ext, const Modes& modes, Signals& signals,
+                          Real* rate) const {
+  const Kernels& kernel = kernels();
+  const auto& [shape, gains, strategy, rbf, graph, cost, dynamics, disturbance, initial] = parameters_;
+  const int players = shape.players;
+  const int n = shape.actions();
+  const Real* x = state + layout_.x();
+  const Real* reference = state + layout_.reference();
+  const Real* e = signals.error.data();
+  const Real* s = signals.network.data();
+  const Real* phi = signals.robust.data();
+  const Real* gradient = signals.gradient.data();
+  Real* g = signals.dynamics.data();
+  Real* d = signals.disturbance.data();
+
+  evaluate_seeking(state, signals);
   if (strategy.robust) {
-    const auto activations = rbf.diagonal ? kernel.activations_diagonal : kernel.activations_general;
-    activations(players, shape.dimension, neurons, rbf.centers.data(), rbf.width, y, signals.exponent.data(),
-                signals.activation.data());
-    kernel.column_products(n, neurons, W, signals.activation.data(), s);
-    // phi_i = delta tanh(K delta e_i / epsilon)
-    kernel.scaled_tanh(n, gains.delta, robust_term_constant * gains.delta / gains.epsilon, e, phi);
     for (int p = 0; p < n; ++p) signals.radial[at(p)] = modes[at(p)] != 0 ? s[p] / rbf.W_max : 0.0;
-    kernel.weight_rates(n, neurons, gains.beta, e, signals.radial.data(), signals.activation.data(), W,
-                        rate + layout_.weights());
+    kernel.weight_rates(n, shape.neurons, gains.beta, e, signals.radial.data(), signals.activation.data(),
+                        state + layout_.weights(), rate + layout_.weights());
   } else {
-    // the estimation module is absent: neither network nor robust term, and weights at rest
-    std::fill_n(s, n, 0.0);
-    std::fill_n(phi, n, 0.0);
     std::fill(rate + layout_.weights(), rate + layout_.size(), 0.0);
   }
-
   if (strategy.perturbed) {
     dynamics->values(x, g);
     disturbance->values(t, d);
@@ -92,8 +103,8 @@ void ClosedLoop::evaluate(Real t, const Real* state, const Real* d_ext, const Mo
       rate[layout_.reference() + p] = second ? driven : -gains.k2 * gradient[p];  // v' = u + g + d or z' = -k2 grad
     }
   }
-  kernel.estimate_rates(players, shape.dimension, graph.neighbours(), gains.k3, y, signals.shared.data(),
-                        rate + layout_.estimates());
+  kernel.estimate_rates(players, shape.dimension, graph.neighbours(), gains.k3, state + layout_.estimates(),
+                        signals.shared.data(), rate + layout_.estimates());
 }
 
 void ClosedLoop::weight_norms(const Real* state, Real* norm2) const {

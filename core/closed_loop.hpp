@@ -27,7 +27,11 @@ class ClosedLoop {
   /// state[size()] at the start of a run, from x0, z0, v0, y0 and W = 0.
   void initial_state(Real* state) const;
 
-  /// Signals and state rates at time t [s]; d_ext[entry(i, l)] is the external disturbance.
+  /// The part of the signals that every player computes from its own state and estimates: xbar, gradient, error,
+  /// activations, network and robust term.
+  void evaluate_seeking(const Real* state, Signals& signals) const;
+
+  /// All signals and state rates at time t [s]; d_ext[entry(i, l)] is the external disturbance.
   void evaluate(Real t, const Real* state, const Real* d_ext, const Modes& modes, Signals& signals, Real* rate) const;
 
   /// w'w of each weight column, at entry(i, l).

@@ -13,7 +13,7 @@ class CoreSystem {
   virtual ~CoreSystem() = default;
 
   virtual void clear() = 0;
-  /// Adds to an entry; with a sparse core only where its pattern has one.
+  /// Adds to an entry; with a sparse core only where its pattern has one, and in the same sequence after each clear().
   virtual void add(int row, int column, Real value) = 0;
   /// False when the matrix is numerically singular.
   virtual bool factor() = 0;

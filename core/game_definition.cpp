@@ -133,7 +133,8 @@ void read_pairs(const TomlEntry& list, int players, std::string_view pair, Read 
   std::vector<bool> seen(at(players), false);
   for (std::size_t k = 0; k < count; ++k) {
     const TomlEntry entry = list.item(k);
-    if (entry.length(pair) != 2) entry.fail("a pair " + std::string(pair));
+    const std::string expected = "a pair " + std::string(pair);
+    if (entry.length(expected) != 2) entry.fail(expected);
     const int j = entry.item(0).integer(1, players) - 1;
     if (seen[at(j)]) entry.fail("each player once, and player " + std::to_string(j + 1) + " comes twice");
     seen[at(j)] = true;

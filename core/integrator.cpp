@@ -132,8 +132,8 @@ class Integrator::Implementation {
 
   // CVODE's callbacks
   int rate(Real t, const Real* state, Real* rate) noexcept;
-  int event_functions(Real t, const Real* state, Real* values) noexcept;
-  int newton_matrix(Real t, const Real* state, Real gamma) noexcept;
+  int event_functions(const Real* state, Real* values) noexcept;
+  int newton_matrix(const Real* state, Real gamma) noexcept;
   int solve_newton(N_Vector x, N_Vector b) noexcept;
 
   template <typename Action>
@@ -151,6 +151,7 @@ class Integrator::Implementation {
   std::unique_ptr<NewtonSolver> newton_;
   LoopJacobian jacobian_;
   int size_;
+  std::int64_t most_steps_between_restarts_;
   Tolerances tolerances_;
 
   // last restart point
@@ -197,6 +198,8 @@ Integrator::Implementation::Implementation(const ClosedLoop& loop, const Externa
       newton_(std::move(newton)),
       jacobian_(loop),
       size_(loop.layout().size()),
+      // about half a second of repetition; a restart costs some 25 steps, so large games pay a few percent for it
+      most_steps_between_restarts_(std::max<std::int64_t>(500, 20'000'000 / size_)),
       restart_state_(at(size_)),
       restart_modes_(at(loop.shape().actions())),
       event_columns_(at(loop.shape().actions())),
@@ -253,16 +256,16 @@ Integrator::Implementation::Implementation(const ClosedLoop& loop, const Externa
           "CVodeWFtolerances");
   require(CVodeSetLinearSolver(memory, solver, matrix_.get()), "CVodeSetLinearSolver");
   require(CVodeSetLinSysFn(memory,
-                           [](SunReal t, N_Vector y, N_Vector, SUNMatrix, SunBoolean, SunBoolean* is_current,
+                           [](SunReal, N_Vector y, N_Vector, SUNMatrix, SunBoolean, SunBoolean* is_current,
                               SunReal gamma, void* self, N_Vector, N_Vector, N_Vector) {
                              *is_current = SUNTRUE;
-                             return static_cast<Self>(self)->newton_matrix(t, NV_DATA_S(y), gamma);
+                             return static_cast<Self>(self)->newton_matrix(NV_DATA_S(y), gamma);
                            }),
           "CVodeSetLinSysFn");
   const int columns = loop.shape().actions();
   require(CVodeRootInit(memory, columns,
-                        [](SunReal t, N_Vector y, SunReal* values, void* self) {
-                          return static_cast<Self>(self)->event_functions(t, NV_DATA_S(y), values);
+                        [](SunReal, N_Vector y, SunReal* values, void* self) {
+                          return static_cast<Self>(self)->event_functions(NV_DATA_S(y), values);
                         }),
           "CVodeRootInit");
   std::vector<int> rising(at(columns), 1);
@@ -283,7 +286,7 @@ int Integrator::Implementation::rate(Real t, const Real* state, Real* rate) noex
 
 // One function for each column, which rises through zero where the column's mode ends: inside, w'w / W_max - 1;
 // on the sphere, -e w'S. It is never exactly zero, because CVODE would stop watching a function that begins at zero.
-int Integrator::Implementation::event_functions(Real t, const Real* state, Real* values) noexcept {
+int Integrator::Implementation::event_functions(const Real* state, Real* values) noexcept {
   return guarded([&] {
     const int n = loop_.shape().actions();
     const bool any_on_sphere = std::any_of(modes_.begin(), modes_.end(), [](auto mode) { return mode != 0; });
@@ -292,10 +295,7 @@ int Integrator::Implementation::event_functions(Real t, const Real* state, Real*
       return 0;
     }
     loop_.weight_norms(state, norm2_.data());
-    if (any_on_sphere) {
-      input_.values(t, d_ext_.data());
-      loop_.evaluate(t, state, d_ext_.data(), modes_, signals_, rate_.data());
-    }
+    if (any_on_sphere) loop_.evaluate_seeking(state, signals_);
     for (int p = 0; p < n; ++p) {
       const Real value = modes_[at(p)] != 0 ? -signals_.error[at(p)] * signals_.network[at(p)]
                                             : norm2_[at(p)] / loop_.parameters().rbf.W_max - 1.0;
@@ -305,10 +305,9 @@ int Integrator::Implementation::event_functions(Real t, const Real* state, Real*
   });
 }
 
-int Integrator::Implementation::newton_matrix(Real t, const Real* state, Real gamma) noexcept {
+int Integrator::Implementation::newton_matrix(const Real* state, Real gamma) noexcept {
   return guarded([&] {
-    input_.values(t, d_ext_.data());
-    loop_.evaluate(t, state, d_ext_.data(), modes_, signals_, rate_.data());
+    loop_.evaluate_seeking(state, signals_);
     jacobian_.linearize(state, signals_, modes_);
     ++newton_setups_;
     return newton_->factor(jacobian_, gamma) ? 0 : 1;
@@ -420,6 +419,11 @@ void Integrator::Implementation::take_step() {
       event_pending_ = true;
       event_time_ = internal_time_;
     }
+  }
+  // an event without columns: a restart that bounds what a restore has to repeat
+  if (!event_pending_ && steps_since_restart_ >= most_steps_between_restarts_) {
+    event_pending_ = true;
+    event_time_ = internal_time_;
   }
 }
 

@@ -19,7 +19,7 @@ class LoopJacobian {
   /// Takes over changed parameters and their sparsity patterns.
   void refresh();
 
-  /// Linearizes at a state; signals are those of ClosedLoop::evaluate at the same time, state and modes.
+  /// Linearizes at a state; signals are those of ClosedLoop::evaluate_seeking at the same state.
   void linearize(const Real* state, const Signals& signals, const Modes& modes);
 
   /// product = J vector, both of the state's length.

@@ -140,7 +140,7 @@ void TomlEntry::accept_keys(std::initializer_list<std::string_view> known) const
     const auto* closest = std::min_element(
         known.begin(), known.end(), [&](std::string_view a, std::string_view b) { return distance(a) < distance(b); });
     std::string expected;
-    if (3 * distance(*closest) <= shown.size()) {
+    if (distance(*closest) <= std::max<std::size_t>(shown.size() / 3, shown.size() < 4 ? 0 : 2)) {
       expected = "the closest known key is " + std::string(*closest);
     } else {
       for (const std::string_view other : known)

@@ -165,6 +165,44 @@ TEST(Integrator, ErrorFallsWithTheTolerance) {
   EXPECT_LT(previous, 1e-7);
 }
 
+TEST(Integrator, DoesNotChatterOnGrazingColumns) {
+  // without a bound the weights swing with the disturbance; a bound just below a peak is touched again and again
+  testing::PlainGame game = testing::random_game({.seed = 5, .players = 2, .dimension = 1, .neurons = 3});
+  game.amplitude = {{4.0}, {3.0}};
+  game.frequency = {{2.0}, {3.0}};
+  game.bias = {{0.0}, {0.0}};
+  game.H = testing::blocks_of(2, 2, 1);
+  game.G = testing::blocks_of(2, 2, 1);
+  game.W_max = 1e6;
+  Simulation free_run(testing::toml_of(game));
+  free_run.integrator.start(0.0, {1e-6, 1e-8});
+  std::vector<Real> peaks;
+  Real before = 0.0;
+  Real last = 0.0;
+  for (int k = 1; k <= 20000; ++k) {
+    free_run.integrator.advance(0.002 * k);
+    const Real norm2 = free_run.largest_norm2();
+    if (last > before && last > norm2) peaks.push_back(last);
+    before = last;
+    last = norm2;
+  }
+  ASSERT_GE(peaks.size(), 10U);
+  const std::int64_t free_steps = free_run.integrator.statistics().steps;
+  for (const Real below : {1e-4, 1e-7, 1e-10, 1e-13}) {
+    game.W_max = peaks.back() * (1.0 - below);
+    Simulation run(testing::toml_of(game));
+    run.integrator.start(0.0, {1e-6, 1e-8});
+    for (int k = 1; k <= 400; ++k) {
+      run.integrator.advance(0.1 * k);
+      EXPECT_LE(run.largest_norm2(), game.W_max * (1.0 + 1e-9));
+    }
+    const Statistics statistics = run.integrator.statistics();
+    EXPECT_GE(statistics.events, 2) << below;
+    EXPECT_LE(statistics.events, 8 * static_cast<std::int64_t>(peaks.size())) << below;
+    EXPECT_LE(statistics.steps, 2 * free_steps) << below;
+  }
+}
+
 TEST(Integrator, AnInputActsFromTheRestartOn) {
   Simulation run(text_of(paper_game));
   run.integrator.start(0.0, {1e-7, 1e-9});

@@ -95,7 +95,7 @@ def state_rate(
     """Right-hand side in given projection modes.
 
     t in s, on_sphere (N, D) true where the weight column follows the on-sphere law, d_ext (N, D) the external
-    disturbance, part of d_i(t) and so removed with it when the game is not perturbed.
+    disturbance, which comes from outside the game and acts whether or not the game is perturbed.
     """
     s = unpack(game, state)
     first = game.first_order[:, np.newaxis]
@@ -103,7 +103,7 @@ def state_rate(
 
     if game.perturbed:
         g = paper.unknown_dynamics(s.x, game.dynamics_linear, game.dynamics_square, game.dynamics_gain)
-        d = d_ext + paper.disturbance(
+        d = paper.disturbance(
             t,
             game.disturbance_bias,
             game.disturbance_amplitude,
@@ -112,6 +112,7 @@ def state_rate(
         )
     else:
         g = d = np.zeros_like(s.x)
+    d = d + d_ext
     x_rate_first = paper.first_order_plant(now.u, g, d)
     x_rate_second, v_rate = paper.second_order_plant(s.p, now.u, g, d)
     x_rate = np.where(first, x_rate_first, x_rate_second)

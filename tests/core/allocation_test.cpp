@@ -1,0 +1,75 @@
+// After a run has started, integrating it asks the heap for nothing: counted by standing in for malloc.
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <cstdlib>
+
+#include "game.hpp"
+#include "integrator.hpp"
+#include "random_game.hpp"
+
+namespace {
+std::atomic<bool> counting{false};
+std::atomic<int> allocations{0};
+void count() {
+  if (counting) ++allocations;
+}
+}  // namespace
+
+extern "C" {
+void* __libc_malloc(std::size_t size);
+void* __libc_calloc(std::size_t count, std::size_t size);
+void* __libc_realloc(void* old, std::size_t size);
+void* __libc_memalign(std::size_t alignment, std::size_t size);
+
+void* malloc(std::size_t size) {
+  count();
+  return __libc_malloc(size);
+}
+void* calloc(std::size_t number, std::size_t size) {
+  count();
+  return __libc_calloc(number, size);
+}
+void* realloc(void* old, std::size_t size) {
+  count();
+  return __libc_realloc(old, size);
+}
+void* aligned_alloc(std::size_t alignment, std::size_t size) {
+  count();
+  return __libc_memalign(alignment, size);
+}
+}
+
+namespace mixed_order_game {
+namespace {
+
+TEST(Allocation, NoneAfterTheStart) {
+  for (const bool coupled : {false, true}) {
+    for (const testing::Recipe& recipe : testing::assorted_recipes()) {
+      testing::PlainGame game = testing::random_game(recipe);
+      game.W_max = 1.0;  // the sphere is reached and left
+      ClosedLoop loop(parse_game(testing::toml_of(game)).parameters);
+      ExternalDisturbance input(loop.shape().actions());
+      Integrator integrator(loop, input, make_structured_newton(coupled));
+      integrator.start(0.0, {1e-6, 1e-8});
+      integrator.advance(0.01);
+      allocations = 0;
+      counting = true;
+      for (int k = 2; k <= 100; ++k) integrator.advance(0.01 * k);
+      counting = false;
+      EXPECT_EQ(allocations, 0) << "game " << recipe.seed;
+      EXPECT_GT(integrator.statistics().steps, 50);
+    }
+  }
+}
+
+TEST(Allocation, IsCounted) {
+  counting = true;
+  allocations = 0;
+  std::free(std::malloc(8));
+  counting = false;
+  EXPECT_GE(allocations, 1);
+}
+
+}  // namespace
+}  // namespace mixed_order_game
