@@ -9,6 +9,7 @@
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
+#include <cstring>
 #include <exception>
 #include <string>
 #include <utility>
@@ -112,7 +113,7 @@ class Integrator::Implementation {
   void start(Real t, Tolerances tolerances);
   void restart(bool parameters_changed);
   void advance(Real t_end);
-  void restore(const Checkpoint& checkpoint, Tolerances tolerances);
+  bool restore(const Checkpoint& checkpoint, Tolerances tolerances);
   [[nodiscard]] Checkpoint checkpoint() const;
   [[nodiscard]] Statistics statistics() const;
 
@@ -493,10 +494,15 @@ Statistics Integrator::Implementation::statistics() const {
 }
 
 Checkpoint Integrator::Implementation::checkpoint() const {
-  return {restart_time_, restart_state_, restart_modes_, restart_statistics_, steps_since_restart_, time_};
+  return {restart_time_, restart_state_, restart_modes_, restart_statistics_, steps_since_restart_,
+          time_,         state_,         modes_,         statistics()};
 }
 
-void Integrator::Implementation::restore(const Checkpoint& checkpoint, Tolerances tolerances) {
+bool Integrator::Implementation::restore(const Checkpoint& checkpoint, Tolerances tolerances) {
+  if (checkpoint.steps_since_restart > most_steps_between_restarts_) {
+    throw Error("the saved state counts " + std::to_string(checkpoint.steps_since_restart) +
+                " steps since the last restart, expected at most " + std::to_string(most_steps_between_restarts_));
+  }
   tolerances_ = tolerances;
   restart_time_ = checkpoint.restart_time;
   restart_state_ = checkpoint.restart_state;
@@ -505,8 +511,28 @@ void Integrator::Implementation::restore(const Checkpoint& checkpoint, Tolerance
   jacobian_.refresh();
   newton_->refresh(jacobian_);
   begin_at_restart_point();
-  while (steps_since_restart_ < checkpoint.steps_since_restart) take_step();
-  present(checkpoint.time);
+  bool same = true;
+  try {
+    while (same && steps_since_restart_ < checkpoint.steps_since_restart) {
+      take_step();
+      same = internal_time_ <= checkpoint.time || steps_since_restart_ == checkpoint.steps_since_restart;
+    }
+    if (same) {
+      present(checkpoint.time);
+      same = checkpoint.state.empty() ||
+             (std::memcmp(state_.data(), checkpoint.state.data(), state_.size() * sizeof(Real)) == 0 &&
+              modes_ == checkpoint.modes);
+    }
+  } catch (const IntegrationError&) {
+    same = false;
+  }
+  if (same) return true;
+  restart_time_ = time_ = checkpoint.time;
+  restart_state_ = state_ = checkpoint.state;
+  restart_modes_ = checkpoint.modes;
+  restart_statistics_ = checkpoint.statistics;
+  begin_at_restart_point();
+  return false;
 }
 
 Integrator::Integrator(const ClosedLoop& loop, const ExternalDisturbance& input,
@@ -523,8 +549,8 @@ const Modes& Integrator::modes() const { return implementation_->modes(); }
 Statistics Integrator::statistics() const { return implementation_->statistics(); }
 Real Integrator::largest_raw_excess() const { return implementation_->largest_raw_excess(); }
 Checkpoint Integrator::checkpoint() const { return implementation_->checkpoint(); }
-void Integrator::restore(const Checkpoint& checkpoint, Tolerances tolerances) {
-  implementation_->restore(checkpoint, tolerances);
+bool Integrator::restore(const Checkpoint& checkpoint, Tolerances tolerances) {
+  return implementation_->restore(checkpoint, tolerances);
 }
 
 }  // namespace mixed_order_game

@@ -29,7 +29,8 @@ struct Statistics {
   friend bool operator==(const Statistics&, const Statistics&) = default;
 };
 
-/// All that is needed to continue a run bit for bit, besides parameters and inputs.
+/// All that is needed to continue a run bit for bit, besides parameters and inputs: the last restart point and the count
+/// of steps since, with the state that they lead to.
 struct Checkpoint {
   Real restart_time = 0.0;
   AlignedVector restart_state;
@@ -37,6 +38,9 @@ struct Checkpoint {
   Statistics restart_statistics;
   std::int64_t steps_since_restart = 0;
   Real time = 0.0;  ///< communication point at which it was taken
+  AlignedVector state;
+  Modes modes;
+  Statistics statistics;
 };
 
 class Integrator {
@@ -67,8 +71,10 @@ class Integrator {
   [[nodiscard]] Real largest_raw_excess() const;
 
   [[nodiscard]] Checkpoint checkpoint() const;
-  /// Returns to a checkpoint by restarting at its restart point and repeating its steps.
-  void restore(const Checkpoint& checkpoint, Tolerances tolerances);
+  /// Returns to a checkpoint by restarting at its restart point and repeating its steps. True when that led to the
+  /// checkpoint's own state, bit for bit; otherwise (another machine's arithmetic) the run goes on from that state with
+  /// a restart, and false is returned. Throws Error when the checkpoint asks for more steps than a run can have taken.
+  bool restore(const Checkpoint& checkpoint, Tolerances tolerances);
 
  private:
   class Implementation;

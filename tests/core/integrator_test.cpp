@@ -109,7 +109,7 @@ TEST(Integrator, RestoresCheckpointsBitForBit) {
     for (const std::size_t from : {0U, 33U, 1U, 7U, 20U, 39U}) {
       Simulation fresh(text_of(game));
       for (Simulation* other : {&run, &fresh}) {
-        other->integrator.restore(checkpoints[from], tolerances);
+        EXPECT_TRUE(other->integrator.restore(checkpoints[from], tolerances)) << from;
         EXPECT_TRUE(same_bits(other->state(), states[from])) << from;
         for (std::size_t k = from + 1; k <= 40; ++k) {
           other->integrator.advance(0.05 * static_cast<Real>(k));
@@ -119,6 +119,25 @@ TEST(Integrator, RestoresCheckpointsBitForBit) {
       }
     }
   }
+}
+
+TEST(Integrator, ContinuesFromTheStoredStateWhenTheStepsLeadElsewhere) {
+  const Tolerances tolerances{1e-8, 1e-10};
+  Simulation run(text_of(paper_game));
+  run.integrator.start(0.0, tolerances);
+  run.integrator.advance(0.8);
+  Checkpoint foreign = run.integrator.checkpoint();
+  run.integrator.advance(1.0);
+  for (std::size_t p = 0; p < 20; ++p) foreign.state[p] += 1e-12;  // as other arithmetic would leave it
+  Simulation other(text_of(paper_game));
+  EXPECT_FALSE(other.integrator.restore(foreign, tolerances));
+  EXPECT_EQ(other.integrator.time(), 0.8);
+  EXPECT_EQ(other.integrator.state()[3], foreign.state[3]);
+  other.integrator.advance(1.0);
+  for (int p = 0; p < 20; ++p) EXPECT_NEAR(other.integrator.state()[p], run.integrator.state()[p], 1e-6);
+
+  foreign.steps_since_restart = std::int64_t{1} << 60;
+  EXPECT_THROW(other.integrator.restore(foreign, tolerances), Error);
 }
 
 TEST(Integrator, StructuredAndDenseSolversGiveTheSameRun) {

@@ -1,0 +1,134 @@
+#include "equilibrium.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <fstream>
+#include <iterator>
+
+#include "errors.hpp"
+#include "game.hpp"
+#include "random_game.hpp"
+
+namespace mixed_order_game {
+namespace {
+
+using testing::assorted_recipes;
+using testing::random_game;
+using testing::toml_of;
+
+TEST(NashEquilibrium, OfTheFiveVehiclesIsMinusOneHalf) {
+  std::ifstream file(MIXED_ORDER_GAME_SOURCE_DIR "/modelDescription/games/five_vehicles.toml");
+  const std::string text{std::istreambuf_iterator<char>(file), {}};
+  const Parameters parameters = parse_game(text).parameters;
+  const std::vector<Real> x_star = nash_equilibrium(*parameters.cost, parameters.shape);
+  ASSERT_EQ(x_star.size(), 10U);
+  for (const Real x : x_star) EXPECT_NEAR(x, -0.5, 1e-15);
+}
+
+TEST(NashEquilibrium, MakesEveryGradientVanish) {
+  for (const auto& recipe : assorted_recipes()) {
+    const Parameters parameters = parse_game(toml_of(random_game(recipe))).parameters;
+    const std::vector<Real> x_star = nash_equilibrium(*parameters.cost, parameters.shape);
+    std::vector<Real> gradient(x_star.size());
+    parameters.cost->own_gradients(x_star.data(), 0, gradient.data());
+    for (const Real g : gradient) EXPECT_NEAR(g, 0.0, 1e-13) << "seed " << recipe.seed;
+  }
+}
+
+TEST(NashEquilibrium, OfTwoPlayersByHand) {
+  // f_1 = x_1^2 + 3 (x_1 - x_2)^2 - 8 x_1, f_2 = 2 x_2^2 - 4 x_2: x_2 = 1 and 8 x_1 = 6 x_2 + 8
+  QuadraticCost cost(2, 1);
+  cost.quadratic = {1.0, 2.0};
+  cost.linear = {-8.0, -4.0};
+  cost.coupling = {0.0, 3.0, 0.0, 0.0};
+  cost.refresh();
+  const Shape shape{.players = 2, .dimension = 1, .neurons = 1, .order = {1, 2}};
+  const std::vector<Real> x_star = nash_equilibrium(cost, shape);
+  EXPECT_NEAR(x_star[0], 1.75, 1e-15);
+  EXPECT_NEAR(x_star[1], 1.0, 1e-15);
+}
+
+TEST(NashEquilibrium, IsRefusedWhereItIsNotUnique) {
+  // both players only wish to meet, wherever
+  QuadraticCost cost(2, 1);
+  cost.coupling = {0.0, 1.0, 1.0, 0.0};
+  cost.refresh();
+  const Shape shape{.players = 2, .dimension = 1, .neurons = 1, .order = {1, 1}};
+  EXPECT_THROW(nash_equilibrium(cost, shape), GameError);
+  cost.quadratic = {0.0, 1e-6};  // one of them now has a preference
+  cost.refresh();
+  EXPECT_NO_THROW(nash_equilibrium(cost, shape));
+}
+
+/// f_1 = exp(x_1 - 1) - x_1 + x_1 x_2 and f_2 = cosh(x_2) - x_1 x_2, which are not quadratic.
+class ExponentialCost final : public Cost {
+ public:
+  [[nodiscard]] std::unique_ptr<Cost> clone() const override { return std::make_unique<ExponentialCost>(*this); }
+  [[nodiscard]] Real value(int i, const Real* x) const override {
+    return i == 0 ? std::exp(x[0] - 1.0) - x[0] + x[0] * x[1] : std::cosh(x[1]) - x[0] * x[1];
+  }
+  void own_gradients(const Real* points, int stride, Real* gradient) const override {
+    gradient[0] = std::exp(points[0] - 1.0) - 1.0 + points[1];
+    gradient[1] = std::sinh(points[stride + 1]) - points[stride];
+  }
+  [[nodiscard]] const SparseRows& hessian_pattern() const override { return pattern_; }
+  void hessian_rows(const Real* points, int stride, Real* values) const override {
+    values[0] = std::exp(points[0] - 1.0);
+    values[1] = 1.0;
+    values[2] = -1.0;
+    values[3] = std::cosh(points[stride + 1]);
+  }
+  void refresh() override {}
+
+ private:
+  SparseRows pattern_{.start = {0, 2, 4}, .column = {0, 1, 0, 1}};
+};
+
+TEST(NashEquilibrium, OfOtherCostsTakesNewtonSteps) {
+  const ExponentialCost cost;
+  const Shape shape{.players = 2, .dimension = 1, .neurons = 1, .order = {1, 1}};
+  const std::vector<Real> x_star = nash_equilibrium(cost, shape);
+  Real gradient[2];
+  cost.own_gradients(x_star.data(), 0, gradient);
+  EXPECT_NEAR(gradient[0], 0.0, 1e-14);
+  EXPECT_NEAR(gradient[1], 0.0, 1e-14);
+  EXPECT_GT(std::abs(x_star[0]), 0.1);
+}
+
+TEST(StrongMonotonicity, IsTheSmallestEigenvalueOfTheSymmetricPart) {
+  // P' = [[2 q_1 + 2 c_12, -2 c_12], [-2 c_21, 2 q_2 + 2 c_21]] with q = (1, 2), c_12 = 3, c_21 = 0
+  QuadraticCost cost(2, 1);
+  cost.quadratic = {1.0, 2.0};
+  cost.coupling = {0.0, 3.0, 0.0, 0.0};
+  cost.refresh();
+  const Shape shape{.players = 2, .dimension = 1, .neurons = 1, .order = {1, 2}};
+  // symmetric part [[8, -3], [-3, 4]]: eigenvalues 6 -+ sqrt(13)
+  EXPECT_NEAR(strong_monotonicity(cost, shape), 6.0 - std::sqrt(13.0), 1e-14);
+}
+
+TEST(StrongMonotonicity, BoundsTheGrowthOfThePseudoGradient) {
+  testing::RandomNumbers random(6);
+  for (const auto& recipe : assorted_recipes()) {
+    const Parameters parameters = parse_game(toml_of(random_game(recipe))).parameters;
+    const std::size_t n = at(parameters.shape.actions());
+    const Real m = strong_monotonicity(*parameters.cost, parameters.shape);
+    std::vector<Real> x(n), z(n), at_x(n), at_z(n);
+    for (int repeat = 0; repeat < 20; ++repeat) {
+      random.fill(x, -3.0, 3.0);
+      random.fill(z, -3.0, 3.0);
+      parameters.cost->own_gradients(x.data(), 0, at_x.data());
+      parameters.cost->own_gradients(z.data(), 0, at_z.data());
+      Real growth = 0.0;
+      Real distance2 = 0.0;
+      for (std::size_t p = 0; p < n; ++p) {
+        growth += (x[p] - z[p]) * (at_x[p] - at_z[p]);
+        distance2 += (x[p] - z[p]) * (x[p] - z[p]);
+      }
+      EXPECT_GE(growth, m * distance2 - 1e-10) << "seed " << recipe.seed;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace mixed_order_game

@@ -1,0 +1,69 @@
+#include "external_disturbance.hpp"
+
+#include <gtest/gtest.h>
+
+namespace mixed_order_game {
+namespace {
+
+Real value_at(const ExternalDisturbance& d, Real t, int entry = 1) {
+  std::vector<Real> values(at(d.entries()));
+  d.values(t, values.data());
+  return values[at(entry)];
+}
+
+Real rate_at(const ExternalDisturbance& d, Real t, int entry = 1) {
+  std::vector<Real> rates(at(d.entries()));
+  d.rates(t, rates.data());
+  return rates[at(entry)];
+}
+
+ExternalDisturbance cubic() {
+  ExternalDisturbance d(3);
+  d.set_value(1, 4.0);
+  d.set_derivative(1, 1, -3.0, 10.0);
+  d.set_derivative(1, 2, 2.0, 10.0);
+  d.set_derivative(1, 3, 6.0, 10.0);
+  return d;
+}
+
+TEST(ExternalDisturbance, IsZeroAtFirst) {
+  const ExternalDisturbance d(3);
+  EXPECT_EQ(d.entries(), 3);
+  for (int entry = 0; entry < 3; ++entry) {
+    EXPECT_EQ(value_at(d, 5.0, entry), 0.0);
+    EXPECT_EQ(rate_at(d, 5.0, entry), 0.0);
+  }
+}
+
+TEST(ExternalDisturbance, IsTheTaylorPolynomialOfItsDerivatives) {
+  const ExternalDisturbance d = cubic();
+  for (const Real h : {0.0, 0.5, 2.0, -1.0}) {
+    EXPECT_DOUBLE_EQ(value_at(d, 10.0 + h), 4.0 - 3.0 * h + h * h + h * h * h);
+    EXPECT_DOUBLE_EQ(rate_at(d, 10.0 + h), -3.0 + 2.0 * h + 3.0 * h * h);
+  }
+  EXPECT_EQ(d.value(1), 4.0);
+  EXPECT_EQ(value_at(d, 12.0, 0), 0.0);
+  EXPECT_EQ(value_at(d, 12.0, 2), 0.0);
+}
+
+TEST(ExternalDisturbance, ANewValueRemovesTheDerivatives) {
+  ExternalDisturbance d = cubic();
+  d.set_value(1, -1.5);
+  EXPECT_EQ(value_at(d, 100.0), -1.5);
+  EXPECT_EQ(rate_at(d, 100.0), 0.0);
+}
+
+TEST(ExternalDisturbance, IsSavedAndRestoredWhole) {
+  const ExternalDisturbance d = cubic();
+  const std::vector<Real> saved(d.numbers().begin(), d.numbers().end());
+  EXPECT_EQ(saved.size(), at(3 * (ExternalDisturbance::highest_derivative + 2)));
+  ExternalDisturbance other(3);
+  other.set_value(0, 7.0);
+  other.set_numbers(saved);
+  EXPECT_EQ(value_at(other, 11.5), value_at(d, 11.5));
+  EXPECT_EQ(value_at(other, 11.5, 0), 0.0);
+  EXPECT_TRUE(std::equal(saved.begin(), saved.end(), other.numbers().begin()));
+}
+
+}  // namespace
+}  // namespace mixed_order_game

@@ -1,0 +1,642 @@
+#include "kernels/kernels.hpp"
+
+#include <gtest/gtest.h>
+
+#include <bit>
+#include <cmath>
+#include <limits>
+#include <memory>
+
+#include "random_game.hpp"
+
+namespace mixed_order_game {
+namespace {
+
+using testing::RandomNumbers;
+
+constexpr double infinity = std::numeric_limits<double>::infinity();
+constexpr double not_a_number = std::numeric_limits<double>::quiet_NaN();
+
+/// Exactly n numbers on the heap, so that the address sanitizer sees every access beyond them.
+class Array {
+ public:
+  explicit Array(int n, double value = 0.0)
+      : size_(n), numbers_(std::make_unique<double[]>(static_cast<std::size_t>(n))) {
+    for (int k = 0; k < n; ++k) (*this)[k] = value;
+  }
+  Array(int n, RandomNumbers& random, double low = -2.0, double high = 2.0) : Array(n) {
+    for (int k = 0; k < n; ++k) (*this)[k] = random.between(low, high);
+  }
+  Array(const Array& other) : Array(other.size_) {
+    for (int k = 0; k < size_; ++k) (*this)[k] = other[k];
+  }
+  Array(Array&&) = default;
+
+  double& operator[](int k) { return numbers_[static_cast<std::size_t>(k)]; }
+  double operator[](int k) const { return numbers_[static_cast<std::size_t>(k)]; }
+  operator double*() { return numbers_.get(); }              // NOLINT
+  operator const double*() const { return numbers_.get(); }  // NOLINT
+  [[nodiscard]] int size() const { return size_; }
+
+  friend bool operator==(const Array& a, const Array& b) {
+    if (a.size_ != b.size_) return false;
+    for (int k = 0; k < a.size_; ++k) {
+      if (std::bit_cast<std::uint64_t>(a[k]) != std::bit_cast<std::uint64_t>(b[k])) return false;
+    }
+    return true;
+  }
+  friend std::ostream& operator<<(std::ostream& out, const Array& array) {
+    for (int k = 0; k < array.size_; ++k) out << array[k] << ' ';
+    return out;
+  }
+
+ private:
+  int size_;
+  std::unique_ptr<double[]> numbers_;
+};
+
+const std::vector<int> sizes{1, 2, 3, 5, 7, 8, 9, 13, 16, 17, 31, 50};
+
+/// Runs a kernel of every level and expects the same bits from each; returns them.
+template <typename Run>
+Array on_every_level(Run run) {
+  Array baseline = run(kernels_of_level(0));
+  for (int level = 1; level < kernel_level_count(); ++level) {
+    const Array other = run(kernels_of_level(level));
+    EXPECT_EQ(other, baseline) << kernels_of_level(level).level;
+  }
+  return baseline;
+}
+
+double distance_in_ulp(double computed, long double exact) {
+  const double rounded = static_cast<double>(exact);
+  if (std::isinf(rounded) || rounded == 0.0) return computed == rounded ? 0.0 : infinity;
+  const long double unit = std::nextafter(std::abs(rounded), infinity) - std::abs(rounded);
+  return static_cast<double>(std::abs(computed - exact) / unit);
+}
+
+TEST(Kernels, BestLevelIsTheLastThatRuns) {
+  EXPECT_STREQ(kernels_of_level(0).level, "baseline");
+  EXPECT_EQ(&kernels(), &kernels_of_level(kernel_level_count() - 1));
+}
+
+// --- elementary functions ---
+
+Array exponentials(const Array& a) {
+  return on_every_level([&](const Kernels& kernel) {
+    Array out(a.size());
+    kernel.exponential(a.size(), a, out);
+    return out;
+  });
+}
+
+Array tanhs(const Array& a) {
+  return on_every_level([&](const Kernels& kernel) {
+    Array out(a.size());
+    kernel.scaled_tanh(a.size(), 1.0, 1.0, a, out);
+    return out;
+  });
+}
+
+Array sines(const Array& a) {
+  return on_every_level([&](const Kernels& kernel) {
+    Array out(a.size());
+    const Array zero(a.size());
+    const Array one(a.size(), 1.0);
+    kernel.sinusoid(a.size(), 0.0, one, zero, a, zero, out);
+    return out;
+  });
+}
+
+/// Numbers of every magnitude up to 2^highest, of both signs.
+Array wide(int n, int lowest, int highest, RandomNumbers& random) {
+  Array a(n);
+  for (int k = 0; k < n; ++k) {
+    a[k] = std::ldexp(random.between(1.0, 2.0), static_cast<int>(random.between(lowest, highest)));
+    if (random.chance(0.5)) a[k] = -a[k];
+  }
+  return a;
+}
+
+TEST(Exponential, IsAccurate) {
+  RandomNumbers random(1);
+  for (const auto& a :
+       {Array(20003, random, -708.0, 709.0), Array(20003, random, -1.0, 1.0), wide(20003, -1074, 9, random)}) {
+    const Array computed = exponentials(a);
+    for (int k = 0; k < a.size(); ++k) {
+      if (a[k] < -708.0 || a[k] > 709.0) continue;
+      ASSERT_LE(distance_in_ulp(computed[k], std::exp(static_cast<long double>(a[k]))), 2.0) << "at " << a[k];
+    }
+  }
+}
+
+TEST(Exponential, OfSpecialNumbers) {
+  Array a(11);
+  const double special[] = {0.0, -0.0, 1.0, -708.0, -708.1, -1e4, -1e300, -infinity, 709.0, not_a_number, 5e-324};
+  std::copy(std::begin(special), std::end(special), static_cast<double*>(a));
+  const Array computed = exponentials(a);
+  EXPECT_EQ(computed[0], 1.0);
+  EXPECT_EQ(computed[1], 1.0);
+  EXPECT_DOUBLE_EQ(computed[2], std::exp(1.0));
+  EXPECT_DOUBLE_EQ(computed[3], std::exp(-708.0));
+  for (int k = 4; k < 8; ++k) EXPECT_EQ(computed[k], 0.0) << a[k];  // what is nearly zero is zero
+  EXPECT_DOUBLE_EQ(computed[8], std::exp(709.0));
+  EXPECT_TRUE(std::isnan(computed[9]));
+  EXPECT_EQ(computed[10], 1.0);
+}
+
+TEST(ScaledTanh, IsAccurate) {
+  RandomNumbers random(2);
+  for (const auto& a :
+       {Array(20003, random, -30.0, 30.0), Array(20003, random, -1.0, 1.0), wide(20003, -1060, 12, random)}) {
+    const Array computed = tanhs(a);
+    for (int k = 0; k < a.size(); ++k) {
+      ASSERT_LE(distance_in_ulp(computed[k], std::tanh(static_cast<long double>(a[k]))), 3.0) << "at " << a[k];
+    }
+  }
+}
+
+TEST(ScaledTanh, OfSpecialNumbers) {
+  Array a(9);
+  const double special[] = {0.0, -0.0, 22.0, -22.0, infinity, -infinity, 1e300, not_a_number, -1e-300};
+  std::copy(std::begin(special), std::end(special), static_cast<double*>(a));
+  const Array computed = tanhs(a);
+  EXPECT_EQ(computed[0], 0.0);
+  EXPECT_TRUE(computed[1] == 0.0 && std::signbit(computed[1]));
+  for (int k = 2; k < 7; ++k) EXPECT_EQ(computed[k], std::signbit(a[k]) ? -1.0 : 1.0) << a[k];
+  EXPECT_TRUE(std::isnan(computed[7]));
+  EXPECT_EQ(computed[8], -1e-300);
+}
+
+TEST(ScaledTanh, ScalesItsArgumentAndItsValue) {
+  RandomNumbers random(3);
+  for (const int n : sizes) {
+    const Array a(n, random);
+    const Array computed = on_every_level([&](const Kernels& kernel) {
+      Array out(a);  // in place
+      kernel.scaled_tanh(n, 10.0, 1.5, out, out);
+      return out;
+    });
+    for (int k = 0; k < n; ++k) EXPECT_NEAR(computed[k], 10.0 * std::tanh(1.5 * a[k]), 1e-14);
+  }
+}
+
+TEST(Sinusoid, IsAccurate) {
+  RandomNumbers random(4);
+  for (const auto& a :
+       {Array(20003, random, -1e5, 1e5), Array(20003, random, -7.0, 7.0), wide(20003, -1060, 16, random)}) {
+    const Array computed = sines(a);
+    for (int k = 0; k < a.size(); ++k) {
+      ASSERT_LE(distance_in_ulp(computed[k], std::sin(static_cast<long double>(a[k]))), 2.0) << "at " << a[k];
+    }
+  }
+}
+
+TEST(Sinusoid, IsAccurateNearItsZeros) {
+  constexpr long double half_pi = 1.570796326794896619231321691639751442L;
+  Array a(63600);  // the numbers nearest to the multiples of pi / 2 below 1e5
+  for (int k = 0; k < a.size(); ++k) a[k] = static_cast<double>((k + 1) * half_pi);
+  const Array computed = sines(a);
+  for (int k = 0; k < a.size(); ++k) {
+    ASSERT_LE(distance_in_ulp(computed[k], std::sin(static_cast<long double>(a[k]))), 2.0) << "at " << a[k];
+  }
+}
+
+TEST(Sinusoid, OfSpecialNumbers) {
+  Array a(6);
+  const double special[] = {0.0, 1e5, -1e22, infinity, not_a_number, 0.5};
+  std::copy(std::begin(special), std::end(special), static_cast<double*>(a));
+  const Array computed = sines(a);
+  EXPECT_EQ(computed[0], 0.0);
+  EXPECT_DOUBLE_EQ(computed[1], std::sin(1e5));
+  EXPECT_DOUBLE_EQ(computed[2], std::sin(-1e22));
+  EXPECT_TRUE(std::isnan(computed[3]));
+  EXPECT_TRUE(std::isnan(computed[4]));
+  EXPECT_DOUBLE_EQ(computed[5], std::sin(0.5));
+  Array alone(1, not_a_number);
+  EXPECT_TRUE(std::isnan(sines(alone)[0]));
+}
+
+TEST(Sinusoid, IsTheDisturbanceFormula) {
+  RandomNumbers random(5);
+  for (const int n : sizes) {
+    const Array amplitude(n, random), frequency(n, random), phase(n, random), bias(n, random);
+    const Array computed = on_every_level([&](const Kernels& kernel) {
+      Array d(n);
+      kernel.sinusoid(n, 3.7, amplitude, frequency, phase, bias, d);
+      return d;
+    });
+    for (int k = 0; k < n; ++k) {
+      EXPECT_NEAR(computed[k], bias[k] + amplitude[k] * std::sin(frequency[k] * 3.7 + phase[k]), 2e-15);
+    }
+  }
+}
+
+// --- sums ---
+
+TEST(Sums, AreThoseOfTheirFormulas) {
+  RandomNumbers random(6);
+  for (const int n : sizes) {
+    const Array a(n, random);
+    const Array b(n, random);
+    const Array computed = on_every_level([&](const Kernels& kernel) {
+      Array sums(5);
+      kernel.moments(n, a, &sums[0], &sums[1]);
+      sums[2] = kernel.dot(n, a, b);
+      sums[3] = kernel.weighted_square_sum(n, a, b);
+      sums[4] = kernel.max_norm(n, a);
+      return sums;
+    });
+    long double expected[5] = {};
+    for (int k = 0; k < n; ++k) {
+      expected[0] += a[k];
+      expected[1] += static_cast<long double>(a[k]) * a[k];
+      expected[2] += static_cast<long double>(a[k]) * b[k];
+      expected[3] += std::pow(static_cast<long double>(a[k]) * b[k], 2);
+      expected[4] = std::max<long double>(expected[4], std::abs(a[k]));
+    }
+    for (int k = 0; k < 5; ++k) EXPECT_NEAR(computed[k], static_cast<double>(expected[k]), 1e-15 * n * 4.0) << k;
+  }
+}
+
+TEST(Sums, PassOnWhatIsNotANumber) {
+  for (const int n : sizes) {
+    const Array ones(n, 1.0);
+    for (int where = 0; where < n; where += 3) {
+      Array a(n, 1.0);
+      a[where] = not_a_number;
+      const Array computed = on_every_level([&](const Kernels& kernel) {
+        Array sums(4);
+        kernel.moments(n, a, &sums[0], &sums[1]);
+        sums[2] = kernel.dot(n, a, ones);
+        sums[3] = kernel.weighted_square_sum(n, ones, a);
+        for (int k = 0; k < 4; ++k) sums[k] = std::isnan(sums[k]) ? 1.0 : 0.0;
+        return sums;
+      });
+      for (int k = 0; k < 4; ++k) EXPECT_EQ(computed[k], 1.0) << k;
+    }
+  }
+}
+
+// --- closed loop ---
+
+struct Size {
+  int players, dimension, neurons;
+};
+const std::vector<Size> loop_sizes{{2, 1, 1}, {3, 2, 5}, {5, 2, 11}, {4, 3, 7}, {7, 1, 3}, {9, 4, 13}};
+
+TEST(Activations, AreGaussians) {
+  RandomNumbers random(7);
+  for (const auto& [players, dimension, neurons] : loop_sizes) {
+    const int n = players * dimension;
+    const Array y(players * n, random);
+    const Array numbers(neurons, random);
+    const Array vectors(neurons * n, random);
+    constexpr double width = 2.7;
+    for (const bool diagonal : {true, false}) {
+      const Array computed = on_every_level([&](const Kernels& kernel) {
+        Array exponent(players * neurons + 7);
+        Array activation(neurons * n);
+        (diagonal ? kernel.activations_diagonal : kernel.activations_general)(
+            players, dimension, neurons, diagonal ? numbers : vectors, width, y, exponent, activation);
+        return activation;
+      });
+      for (int m = 0; m < neurons; ++m) {
+        for (int i = 0; i < players; ++i) {
+          double squares = 0.0;
+          for (int k = 0; k < n; ++k)
+            squares += std::pow(y[i * n + k] - (diagonal ? numbers[m] : vectors[m * n + k]), 2);
+          const double expected = std::exp(-squares / (width * width));
+          for (int l = 0; l < dimension; ++l) {
+            EXPECT_NEAR(computed[m * n + l * players + i], expected, 1e-13 * expected);
+          }
+        }
+      }
+    }
+  }
+}
+
+TEST(Activations, FarFromEveryCenterAreZero) {
+  for (const double far : {1e3, 1e100, 1e150}) {
+    const Array y(8, far);  // two players, two dimensions
+    const Array centers(1, 1.0);
+    const Array center_vectors(4, 1.0);
+    for (const bool diagonal : {true, false}) {
+      const Array computed = on_every_level([&](const Kernels& kernel) {
+        Array exponent(2 + 7);
+        Array activation(4, 9.0);
+        (diagonal ? kernel.activations_diagonal : kernel.activations_general)(
+            2, 2, 1, diagonal ? centers : center_vectors, 1.0, y, exponent, activation);
+        return activation;
+      });
+      EXPECT_EQ(computed, Array(4, 0.0)) << far;
+    }
+  }
+}
+
+/// A ring with chords, of random weights, as compressed rows.
+struct Ring {
+  std::vector<int> start{0};
+  std::vector<int> neighbour;
+  std::vector<double> weight;
+  std::vector<double> dense;  // [i N + j]
+
+  Ring(int players, RandomNumbers& random) : dense(static_cast<std::size_t>(players * players)) {
+    const auto at_entry = [&](int i, int j) -> double& { return dense[static_cast<std::size_t>(i * players + j)]; };
+    for (int i = 0; i < players; ++i) {
+      for (const int step : {1, 3}) {
+        const int j = (i + step) % players;
+        if (j != i) at_entry(i, j) = at_entry(j, i) = random.between(0.5, 2.0);
+      }
+    }
+    for (int i = 0; i < players; ++i) {
+      for (int j = 0; j < players; ++j) {
+        if (at_entry(i, j) == 0.0) continue;
+        neighbour.push_back(j);
+        weight.push_back(at_entry(i, j));
+      }
+      start.push_back(static_cast<int>(neighbour.size()));
+    }
+  }
+  [[nodiscard]] NeighbourRows rows() const { return {start.data(), neighbour.data(), weight.data()}; }
+};
+
+TEST(EstimateRates, AreTheConsensusLaw) {
+  RandomNumbers random(8);
+  for (const auto& [players, dimension, neurons] : loop_sizes) {
+    const int n = players * dimension;
+    const Ring ring(players, random);
+    const Array y(players * n, random);
+    const Array xbar(n, random);
+    const Array computed = on_every_level([&](const Kernels& kernel) {
+      Array rate(players * n, 9.0);
+      kernel.estimate_rates(players, dimension, ring.rows(), 50.0, y, xbar, rate);
+      return rate;
+    });
+    for (int i = 0; i < players; ++i) {
+      for (int p = 0; p < n; ++p) {
+        double expected = 0.0;
+        for (int k = 0; k < players; ++k) {
+          expected += ring.dense[static_cast<std::size_t>(i * players + k)] * (y[i * n + p] - y[k * n + p]);
+        }
+        expected += ring.dense[static_cast<std::size_t>(i * players + p % players)] * (y[i * n + p] - xbar[p]);
+        EXPECT_NEAR(computed[i * n + p], -50.0 * expected, 1e-12);
+      }
+    }
+  }
+}
+
+TEST(Columns, FollowTheirFormulas) {
+  RandomNumbers random(9);
+  for (const int n : sizes) {
+    constexpr int rows = 6;
+    const Array S(rows * n, random), w(rows * n, random), change(rows * n, random), centers(rows, random);
+    const Array e(n, random), r(n, random), scale(n, random), from_activation(n, random), onto_weight(n, random);
+
+    const Array products = on_every_level([&](const Kernels& kernel) {
+      Array sum(n, 9.0);
+      kernel.column_products(n, rows, w, S, sum);
+      return sum;
+    });
+    const Array rates = on_every_level([&](const Kernels& kernel) {
+      Array rate(rows * n);
+      kernel.weight_rates(n, rows, 30.0, e, r, S, w, rate);
+      return rate;
+    });
+    const Array corrected = on_every_level([&](const Kernels& kernel) {
+      Array rhs(S);
+      kernel.weight_corrections(n, rows, scale, e, from_activation, onto_weight, S, change, w, rhs);
+      return rhs;
+    });
+    const Array moments = on_every_level([&](const Kernels& kernel) {
+      Array sums(3 * n, 9.0);
+      kernel.network_moments(n, rows, centers, S, w, sums, sums + n, sums + 2 * n);
+      return sums;
+    });
+    const Array changes = on_every_level([&](const Kernels& kernel) {
+      Array out(rows * n);
+      kernel.activation_changes(n, rows, centers, -0.5, S, e, r, out);
+      return out;
+    });
+    for (int p = 0; p < n; ++p) {
+      double product = 0.0, squares = 0.0, centered_squares = 0.0, centered_products = 0.0;
+      for (int m = 0; m < rows; ++m) {
+        const int k = m * n + p;
+        product += w[k] * S[k];
+        squares += S[k] * S[k];
+        centered_squares += centers[m] * S[k] * S[k];
+        centered_products += centers[m] * w[k] * S[k];
+        EXPECT_NEAR(rates[k], 30.0 * e[p] * (S[k] - r[p] * w[k]), 1e-12);
+        EXPECT_NEAR(corrected[k],
+                    scale[p] * S[k] + e[p] * S[k] + from_activation[p] * change[k] + onto_weight[p] * w[k], 1e-14);
+        EXPECT_NEAR(changes[k], S[k] * -0.5 * (e[p] - centers[m] * r[p]), 1e-14);
+      }
+      EXPECT_NEAR(products[p], product, 1e-14);
+      EXPECT_NEAR(moments[p], squares, 1e-14);
+      EXPECT_NEAR(moments[n + p], centered_squares, 1e-14);
+      EXPECT_NEAR(moments[2 * n + p], centered_products, 1e-14);
+    }
+  }
+}
+
+TEST(SharedSignal, IsAddedToTheEstimateOfItsPlayer) {
+  RandomNumbers random(10);
+  for (const auto& [players, dimension, neurons] : loop_sizes) {
+    const int n = players * dimension;
+    const Array gain(players * players, random), shared(n, random), y(players * n, random);
+    const Array computed = on_every_level([&](const Kernels& kernel) {
+      Array out(y);
+      kernel.add_shared_signal(players, dimension, gain, shared, out);
+      return out;
+    });
+    for (int i = 0; i < players; ++i) {
+      for (int p = 0; p < n; ++p) {
+        EXPECT_NEAR(computed[i * n + p], y[i * n + p] + gain[i * players + p % players] * shared[p], 1e-14);
+      }
+    }
+  }
+}
+
+// --- Newton solver ---
+
+/// Blocks with a full pattern, eliminated in reversed order of players.
+struct FullPattern {
+  int players;
+  std::vector<int> start{0}, row, order, target;
+
+  explicit FullPattern(int n) : players(n) {
+    const auto entry = [&](int i, int k) { return start[static_cast<std::size_t>(k)] + i - k - 1; };  // of row i > k
+    for (int k = 0; k < n; ++k) {
+      order.push_back(n - 1 - k);
+      for (int i = k + 1; i < n; ++i) row.push_back(i);
+      start.push_back(static_cast<int>(row.size()));
+    }
+    for (int k = 0; k < n; ++k) {
+      for (int a = k + 1; a < n; ++a) {
+        for (int b = k + 1; b < a; ++b) target.push_back(entry(a, b));
+      }
+    }
+  }
+  [[nodiscard]] BlockPattern pattern() const {
+    return {players, start.data(), row.data(), order.data(), target.data()};
+  }
+};
+
+TEST(Blocks, AreFactoredAndSolvedSideBySide) {
+  RandomNumbers random(11);
+  for (const int n : {2, 3, 5, 8, 9, 13}) {
+    constexpr int width = 3;
+    const FullPattern full(n);
+    const int entries = n * (n - 1) / 2;
+    // block j, in elimination order: diagonally dominant, below the diagonal lower[(entry of i, k) n + j]
+    const Array lower(entries * n, random, -1.0, 1.0);
+    const Array diagonal(n * n, random, 2.0 * n, 3.0 * n);
+    const Array rhs(n * width * n, random);
+    const Array solution = on_every_level([&](const Kernels& kernel) {
+      Array l(lower);
+      Array d(diagonal);
+      Array x(rhs);
+      kernel.factor_blocks(full.pattern(), l, d);
+      for (int k = 0; k < n * n; ++k) d[k] = 1.0 / d[k];
+      kernel.solve_blocks(full.pattern(), width, l, d, x);
+      return x;
+    });
+    const auto of_player = [&](const Array& rows, int k, int h, int j) {  // unknown eliminated k-th
+      return rows[full.order[static_cast<std::size_t>(k)] * width * n + h * n + j];
+    };
+    for (int j = 0; j < n; ++j) {
+      for (int h = 0; h < width; ++h) {
+        for (int i = 0; i < n; ++i) {
+          double sum = diagonal[i * n + j] * of_player(solution, i, h, j);
+          for (int k = 0; k < n; ++k) {
+            if (k == i) continue;
+            const int low = std::min(i, k);
+            const int entry = full.start[static_cast<std::size_t>(low)] + std::max(i, k) - low - 1;
+            sum += lower[entry * n + j] * of_player(solution, k, h, j);
+          }
+          EXPECT_NEAR(sum, of_player(rhs, i, h, j), 1e-13) << n;
+        }
+      }
+    }
+  }
+}
+
+TEST(DenseLu, SolvesWithPivoting) {
+  RandomNumbers random(12);
+  for (const int n : {1, 2, 3, 7, 8, 9, 17, 40}) {
+    Array matrix(n * n, random);
+    for (int k = 0; k + 1 < n; ++k) matrix[k * n + k] = 0.0;  // no pivot on the diagonal
+    const Array rhs(n, random);
+    const Array solution = on_every_level([&](const Kernels& kernel) {
+      Array lu(matrix);
+      Array x(rhs);
+      std::vector<int> pivot(static_cast<std::size_t>(n));
+      EXPECT_TRUE(kernel.lu_factor(n, lu, pivot.data()));
+      kernel.lu_solve(n, lu, pivot.data(), x);
+      return x;
+    });
+    for (int i = 0; i < n; ++i) {
+      double sum = 0.0;
+      double size = 0.0;
+      for (int j = 0; j < n; ++j) {
+        sum += matrix[i * n + j] * solution[j];
+        size += std::abs(matrix[i * n + j] * solution[j]);
+      }
+      EXPECT_NEAR(sum, rhs[i], 1e-13 * (size + 1.0)) << n;
+    }
+  }
+}
+
+TEST(DenseLu, TellsASingularMatrix) {
+  for (int level = 0; level < kernel_level_count(); ++level) {
+    const Kernels& kernel = kernels_of_level(level);
+    int pivot[2];
+    double dependent[] = {1.0, 2.0, 2.0, 4.0};
+    EXPECT_FALSE(kernel.lu_factor(2, dependent, pivot));
+    double zero[] = {0.0, 1.0, 0.0, 1.0};
+    EXPECT_FALSE(kernel.lu_factor(2, zero, pivot));
+    double undefined[] = {not_a_number, 1.0, 1.0, 1.0};
+    EXPECT_FALSE(kernel.lu_factor(2, undefined, pivot));
+  }
+}
+
+// --- vectors ---
+
+TEST(Vectors, LinearSumsMeetTheFormulaForAllCoefficients) {
+  RandomNumbers random(13);
+  for (const int n : sizes) {
+    const Array x(n, random), y(n, random);
+    for (const double a : {1.0, -1.0, 2.5, -2.5, 0.0}) {
+      for (const double b : {1.0, -1.0, 2.5, -2.5, 0.3}) {
+        const Array computed = on_every_level([&](const Kernels& kernel) {
+          Array z(n, 9.0);
+          kernel.linear_sum(n, a, x, b, y, z);
+          return z;
+        });
+        for (int k = 0; k < n; ++k) EXPECT_NEAR(computed[k], a * x[k] + b * y[k], 2e-15) << a << ' ' << b;
+        const Array onto_x = on_every_level([&](const Kernels& kernel) {
+          Array z(x);
+          kernel.linear_sum(n, a, z, b, y, z);
+          return z;
+        });
+        const Array onto_y = on_every_level([&](const Kernels& kernel) {
+          Array z(y);
+          kernel.linear_sum(n, a, x, b, z, z);
+          return z;
+        });
+        EXPECT_EQ(onto_x, computed);
+        EXPECT_EQ(onto_y, computed);
+      }
+    }
+  }
+}
+
+TEST(Vectors, EqualVectorsCancelExactly) {
+  RandomNumbers random(14);
+  const Array x(37, random);
+  for (const double a : {1.0, -1.0, 0.1, 1.0 / 3.0}) {
+    const Array computed = on_every_level([&](const Kernels& kernel) {
+      Array z(37, 9.0);
+      kernel.linear_sum(37, a, x, -a, x, z);
+      for (int k = 0; k < 37; ++k) z[k] = std::abs(z[k]);
+      return z;
+    });
+    EXPECT_EQ(computed, Array(37, 0.0));
+  }
+}
+
+TEST(Vectors, AreScaledFilledAndWeighted) {
+  RandomNumbers random(15);
+  for (const int n : sizes) {
+    const Array x(n, random);
+    for (const double c : {1.0, -1.0, 0.3}) {
+      const Array scaled = on_every_level([&](const Kernels& kernel) {
+        Array z(n, 9.0);
+        kernel.scale(n, c, x, z);
+        return z;
+      });
+      const Array in_place = on_every_level([&](const Kernels& kernel) {
+        Array z(x);
+        kernel.scale(n, c, z, z);
+        return z;
+      });
+      for (int k = 0; k < n; ++k) EXPECT_EQ(scaled[k], c * x[k]);
+      EXPECT_EQ(in_place, scaled);
+    }
+    EXPECT_EQ(on_every_level([&](const Kernels& kernel) {
+                Array z(n, 9.0);
+                kernel.fill(n, -1.5, z);
+                return z;
+              }),
+              Array(n, -1.5));
+    const Array weights = on_every_level([&](const Kernels& kernel) {
+      Array weight(n, 9.0);
+      kernel.error_weights(n, 1e-3, 1e-6, x, weight);
+      return weight;
+    });
+    for (int k = 0; k < n; ++k) EXPECT_DOUBLE_EQ(weights[k], 1.0 / (1e-3 * std::abs(x[k]) + 1e-6));
+  }
+}
+
+}  // namespace
+}  // namespace mixed_order_game

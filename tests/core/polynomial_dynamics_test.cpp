@@ -1,0 +1,76 @@
+#include "polynomial_dynamics.hpp"
+
+#include <gtest/gtest.h>
+
+namespace mixed_order_game {
+namespace {
+
+// three players in two dimensions; x = (1, 2), (3, 5), (-1, 4), coordinates outermost
+constexpr int N = 3;
+constexpr int D = 2;
+const std::vector<Real> x{1.0, 3.0, -1.0, 2.0, 5.0, 4.0};
+
+PolynomialDynamics dynamics() {
+  return {N,
+          D,
+          {{.player = 2, .other = 2, .coordinate = 1, .linear = 3.0},
+           {.player = 0, .other = 2, .coordinate = 0, .linear = 2.0, .square = -0.5},
+           {.player = 0, .other = 1, .coordinate = 0, .square = 1.0},
+           {.player = 1, .other = 0, .coordinate = 1, .linear = -1.0, .square = 0.25}}};
+}
+
+TEST(PolynomialDynamics, ValuesAreTheFormula) {
+  std::vector<Real> g(N * D, 99.0);
+  PolynomialDynamics d = dynamics();
+  d.values(x.data(), g.data());
+  // g_11 = x_21^2 + 2 x_31 - 0.5 x_31^2, g_22 = -x_12 + 0.25 x_12^2, g_32 = 3 x_32
+  EXPECT_EQ(g, (std::vector<Real>{9.0 - 2.0 - 0.5, 0.0, 0.0, 0.0, -2.0 + 1.0, 12.0}));
+  d.gain = {2.0, -1.0, 0.5};
+  d.values(x.data(), g.data());
+  EXPECT_EQ(g, (std::vector<Real>{13.0, 0.0, 0.0, 0.0, 1.0, 6.0}));
+}
+
+TEST(PolynomialDynamics, JacobianIsTheDerivativeOfTheValues) {
+  PolynomialDynamics d = dynamics();
+  d.gain = {2.0, -1.0, 0.5};
+  const SparseRows& pattern = d.jacobian_pattern();
+  ASSERT_EQ(pattern.rows(), N * D);
+  EXPECT_EQ(pattern.start, (std::vector<int>{0, 2, 2, 2, 2, 3, 4}));
+  EXPECT_EQ(pattern.column, (std::vector<int>{1, 2, 3, 5}));
+  std::vector<Real> values(at(pattern.entries()));
+  d.jacobian(x.data(), values.data());
+  std::vector<Real> above(N * D);
+  std::vector<Real> below(N * D);
+  for (int row = 0; row < N * D; ++row) {
+    for (int k = pattern.start[at(row)]; k < pattern.start[at(row + 1)]; ++k) {
+      std::vector<Real> moved = x;
+      moved[at(pattern.column[at(k)])] += 0.5;
+      d.values(moved.data(), above.data());
+      moved[at(pattern.column[at(k)])] -= 1.0;
+      d.values(moved.data(), below.data());
+      EXPECT_DOUBLE_EQ(values[at(k)], above[at(row)] - below[at(row)]);  // exact for squares
+    }
+  }
+}
+
+TEST(PolynomialDynamics, ACloneKeepsGainsAndTerms) {
+  PolynomialDynamics d = dynamics();
+  d.gain[0] = 3.0;
+  const std::unique_ptr<UnknownDynamics> clone = d.clone();
+  d.gain[0] = 7.0;
+  std::vector<Real> g(N * D);
+  clone->values(x.data(), g.data());
+  EXPECT_EQ(g[0], 3.0 * 6.5);
+}
+
+TEST(PolynomialDynamics, WithoutTermsIsZero) {
+  const PolynomialDynamics none(N, D, {});
+  std::vector<Real> g(N * D, 99.0);
+  none.values(x.data(), g.data());
+  EXPECT_EQ(g, std::vector<Real>(N * D, 0.0));
+  EXPECT_EQ(none.jacobian_pattern().entries(), 0);
+  EXPECT_EQ(none.jacobian_pattern().rows(), N * D);
+}
+
+}  // namespace
+}  // namespace mixed_order_game
