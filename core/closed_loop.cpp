@@ -120,6 +120,22 @@ void ClosedLoop::resolve_modes(const Real* norm2, const Signals& signals, Modes&
   }
 }
 
+void ClosedLoop::event_functions(const Real* state, const Modes& modes, Signals& signals, Real* values) const {
+  constexpr Real hysteresis = 1e-12;
+  constexpr Real almost_zero = 1e-100;  // integrators stop watching a function that begins at zero
+  if (!parameters_.strategy.robust) {
+    std::fill_n(values, modes.size(), -1.0);
+    return;
+  }
+  weight_norms(state, values);
+  if (std::any_of(modes.begin(), modes.end(), [](auto mode) { return mode != 0; })) evaluate_seeking(state, signals);
+  for (std::size_t p = 0; p < modes.size(); ++p) {
+    const Real value = modes[p] != 0 ? -signals.error[p] * signals.network[p]
+                                     : values[p] / parameters_.rbf.W_max - 1.0 - hysteresis;
+    values[p] = value == 0.0 ? -almost_zero : value;
+  }
+}
+
 void ClosedLoop::project(const Modes& modes, Real* state) const {
   const Real W_max = parameters_.rbf.W_max;
   for (int p = 0; p < shape().actions(); ++p) {

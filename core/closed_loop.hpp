@@ -41,6 +41,11 @@ class ClosedLoop {
   /// e w'S >= 0. Signals and norms w'w as of this state.
   void resolve_modes(const Real* norm2, const Signals& signals, Modes& modes) const;
 
+  /// One event function for each column, at entry(i, l), which rises through zero where the column's mode ends: inside,
+  /// w'w / W_max - 1 (less a hysteresis of rounding size, so that a column that has just left the sphere is not seen to
+  /// return); on the sphere, -e w'S. Never exactly zero. Evaluates the seeking signals when a column is on the sphere.
+  void event_functions(const Real* state, const Modes& modes, Signals& signals, Real* values) const;
+
   /// Puts the state where the modes say it is: columns on the sphere are scaled to w'w = W_max, and columns inside
   /// that lie above the bound are scaled back to it.
   void project(const Modes& modes, Real* state) const;

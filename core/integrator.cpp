@@ -285,23 +285,10 @@ int Integrator::Implementation::rate(Real t, const Real* state, Real* rate) noex
   });
 }
 
-// One function for each column, which rises through zero where the column's mode ends: inside, w'w / W_max - 1;
-// on the sphere, -e w'S. It is never exactly zero, because CVODE would stop watching a function that begins at zero.
 int Integrator::Implementation::event_functions(const Real* state, Real* values) noexcept {
   return guarded([&] {
-    const int n = loop_.shape().actions();
-    const bool any_on_sphere = std::any_of(modes_.begin(), modes_.end(), [](auto mode) { return mode != 0; });
-    if (!loop_.parameters().strategy.robust) {
-      std::fill_n(values, n, -1.0);
-      return 0;
-    }
-    loop_.weight_norms(state, norm2_.data());
-    if (any_on_sphere) loop_.evaluate_seeking(state, signals_);
-    for (int p = 0; p < n; ++p) {
-      const Real value = modes_[at(p)] != 0 ? -signals_.error[at(p)] * signals_.network[at(p)]
-                                            : norm2_[at(p)] / loop_.parameters().rbf.W_max - 1.0;
-      values[p] = event_values_[at(p)] = value == 0.0 ? -1e-100 : value;
-    }
+    loop_.event_functions(state, modes_, signals_, values);
+    std::copy_n(values, event_values_.size(), event_values_.begin());
     return 0;
   });
 }
