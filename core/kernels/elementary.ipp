@@ -64,8 +64,8 @@ inline void reduce_exponential(const Vector& a, Vector* expm1_of_rest, Vector* p
 inline Vector exponential_of(const Vector& a) {
   constexpr double lowest = -708.0;  // exp(a) is still a normal number
   constexpr double highest = 709.0;
-  const Vector low = a - a + lowest;
-  const Vector high = a - a + highest;
+  const Vector low = Vector{} + lowest;
+  const Vector high = Vector{} + highest;
   Vector clamped = a < low ? low : a;
   clamped = clamped > high ? high : clamped;
   Vector rest;

@@ -295,7 +295,7 @@ TEST(Activations, AreGaussians) {
     constexpr double width = 2.7;
     for (const bool diagonal : {true, false}) {
       const Array computed = on_every_level([&](const Kernels& kernel) {
-        Array exponent(players * neurons + 7);
+        Array exponent(players * (neurons + 2) + 8);
         Array activation(neurons * n);
         (diagonal ? kernel.activations_diagonal : kernel.activations_general)(
             players, dimension, neurons, diagonal ? numbers : vectors, width, y, exponent, activation);
@@ -317,13 +317,13 @@ TEST(Activations, AreGaussians) {
 }
 
 TEST(Activations, FarFromEveryCenterAreZero) {
-  for (const double far : {1e3, 1e100, 1e150}) {
+  for (const double far : {1e3, 1e100, 1e150, 1e160}) {
     const Array y(8, far);  // two players, two dimensions
     const Array centers(1, 1.0);
     const Array center_vectors(4, 1.0);
     for (const bool diagonal : {true, false}) {
       const Array computed = on_every_level([&](const Kernels& kernel) {
-        Array exponent(2 + 7);
+        Array exponent(2 * 3 + 8);
         Array activation(4, 9.0);
         (diagonal ? kernel.activations_diagonal : kernel.activations_general)(
             2, 2, 1, diagonal ? centers : center_vectors, 1.0, y, exponent, activation);
@@ -539,8 +539,8 @@ TEST(DenseLu, SolvesWithPivoting) {
       double sum = 0.0;
       double size = 0.0;
       for (int j = 0; j < n; ++j) {
-        sum += matrix[i * n + j] * solution[j];
-        size += std::abs(matrix[i * n + j] * solution[j]);
+        sum += matrix[j * n + i] * solution[j];
+        size += std::abs(matrix[j * n + i] * solution[j]);
       }
       EXPECT_NEAR(sum, rhs[i], 1e-13 * (size + 1.0)) << n;
     }
