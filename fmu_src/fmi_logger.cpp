@@ -1,0 +1,37 @@
+#include "fmi_logger.hpp"
+
+#include <algorithm>
+
+namespace mixed_order_game {
+
+std::string harmless(std::string_view text) {
+  std::string clean(text);
+  for (char& character : clean) {
+    if (character == '%' || character == '#') character = '_';
+    if (static_cast<unsigned char>(character) < 0x20) character = ' ';
+  }
+  return clean;
+}
+
+void FmiLogger::error(std::string_view message) const {
+  if (sink_) sink_(Severity::error, error_category, harmless(message).c_str());
+}
+
+void FmiLogger::event(std::string_view message) const {
+  if (tells_events()) sink_(Severity::ok, event_category, harmless(message).c_str());
+}
+
+bool FmiLogger::choose(bool on, std::span<const char* const> categories) {
+  bool events = categories.empty();
+  for (const char* name : categories) {
+    const auto known = [&](const LogCategory& category) {
+      return name != nullptr && category.name == std::string_view(name);
+    };
+    if (std::none_of(log_categories.begin(), log_categories.end(), known)) return false;
+    events = events || std::string_view(name) != error_category;
+  }
+  events_on_ = on ? events_on_ || events : events_on_ && !events;
+  return true;
+}
+
+}  // namespace mixed_order_game

@@ -1,0 +1,52 @@
+// Messages for the importer: with a category, formatted, and free of the characters that its logger could interpret.
+#pragma once
+
+#include <array>
+#include <functional>
+#include <span>
+#include <string>
+#include <string_view>
+
+namespace mixed_order_game {
+
+enum class Severity { ok, warning, error };
+
+struct LogCategory {
+  const char* name;
+  const char* description;
+};
+
+/// Declared in modelDescription.xml.
+inline constexpr std::array<LogCategory, 3> log_categories{{
+    {"logStatusError", "Calls that were refused and integrations that failed, with the reason"},
+    {"logEvents", "Course of the run: initialization, integration statistics at its end"},
+    {"logAll", "All messages"},
+}};
+inline constexpr const char* error_category = log_categories[0].name;
+inline constexpr const char* event_category = log_categories[1].name;
+
+/// The text with '%' and '#' replaced, which importers take for formats and value references, and control characters
+/// turned into blanks.
+std::string harmless(std::string_view text);
+
+class FmiLogger {
+ public:
+  using Sink = std::function<void(Severity, const char* category, const char* message)>;
+
+  /// An empty sink is fine: nothing is said then.
+  FmiLogger(Sink sink, bool on) : sink_(std::move(sink)), events_on_(on) {}
+
+  /// Errors are always told.
+  void error(std::string_view message) const;
+  void event(std::string_view message) const;
+  [[nodiscard]] bool tells_events() const { return events_on_ && sink_ != nullptr; }
+
+  /// No categories mean all. False, and nothing changes, when one of them is unknown.
+  bool choose(bool on, std::span<const char* const> categories);
+
+ private:
+  Sink sink_;
+  bool events_on_;
+};
+
+}  // namespace mixed_order_game

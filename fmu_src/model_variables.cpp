@@ -1,0 +1,693 @@
+#include "model_variables.hpp"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <limits>
+
+#include "measures.hpp"
+
+namespace mixed_order_game {
+
+namespace {
+
+constexpr SimpleType declared[] = {
+    {"Time", Type::real, "s", "Time"},
+    {"Action", Type::real, "1", "Entry of an action"},
+    {"Velocity", Type::real, "1/s", "Rate of change of an action"},
+    {"Drive", Type::real, nullptr, "Drives an action (order 1) or a velocity (order 2)"},
+    {"Gain", Type::real, nullptr, "Gain of the strategy"},
+    {"EdgeWeight", Type::real, "1", "Weight of an edge of the communication graph; 0 means no edge", 0},
+    {"AngularFrequency", Type::real, "rad/s", "Angular frequency of a disturbance"},
+    {"Phase", Type::real, "rad", "Phase of a disturbance"},
+    {"CostCoefficient", Type::real, "1", "Coefficient of a cost function"},
+    {"Weight", Type::real, nullptr, "Weight of the neural network"},
+    {"Count", Type::integer, nullptr, "Number of occurrences since the start", 0},
+    {"Order", Type::integer, nullptr, "1: velocity-driven, 2: acceleration-driven", 1, 2},
+};
+
+constexpr Unit known_units[] = {{"1", 0, 0},     {"s", 1, 0},     {"1/s", -1, 0},   {"1/s2", -2, 0},
+                                {"1/s3", -3, 0}, {"1/s4", -4, 0}, {"rad/s", -1, 1}, {"rad", 0, 1}};
+
+constexpr Real no_tolerance_above = 0.1;
+
+const QuadraticCost& cost_in(const View& view) {
+  return static_cast<const QuadraticCost&>(*view.settings->parameters.cost);
+}
+const PolynomialDynamics& dynamics_in(const View& view) {
+  return static_cast<const PolynomialDynamics&>(*view.settings->parameters.dynamics);
+}
+const SinusoidalDisturbance& disturbance_in(const View& view) {
+  return static_cast<const SinusoidalDisturbance&>(*view.settings->parameters.disturbance);
+}
+
+// Accessors made from members, so that reading and setting name the same one.
+template <auto Member>
+Real read_gain(const View& view, int) {
+  return view.settings->parameters.gains.*Member;
+}
+template <auto Member>
+void write_gain(Settings& settings, int, Real value) {
+  settings.parameters.gains.*Member = value;
+}
+template <auto Member>
+Real read_cost(const View& view, int slot) {
+  return (cost_in(view).*Member)[at(slot)];
+}
+template <auto Member>
+void write_cost(Settings& settings, int slot, Real value) {
+  (cost_of(settings.parameters).*Member)[at(slot)] = value;
+}
+template <auto Member>
+Real read_disturbance(const View& view, int slot) {
+  return (disturbance_in(view).*Member)[at(slot)];
+}
+template <auto Member>
+void write_disturbance(Settings& settings, int slot, Real value) {
+  (disturbance_of(settings.parameters).*Member)[at(slot)] = value;
+}
+template <auto Member>
+Real read_initial(const View& view, int slot) {
+  return (view.settings->parameters.initial.*Member)[at(slot)];
+}
+template <auto Member>
+void write_initial(Settings& settings, int slot, Real value) {
+  (settings.parameters.initial.*Member)[at(slot)] = value;
+}
+template <auto Member>
+Real read_signal(const View& view, int slot) {
+  return (view.signals->*Member)[at(slot)];
+}
+// Parts of the state vector and of its rate, by the layout's offset.
+template <auto Offset>
+Real read_state(const View& view, int slot) {
+  return view.state[(view.loop->layout().*Offset)() + slot];
+}
+template <auto Offset>
+Real read_rate(const View& view, int slot) {
+  return view.rate[(view.loop->layout().*Offset)() + slot];
+}
+template <auto Member>
+Real read_count(const View& view, int) {
+  return static_cast<Real>(std::min<std::int64_t>(view.statistics.*Member, std::numeric_limits<std::int32_t>::max()));
+}
+
+// d/dt |x - x*| = (x - x*)'x' / |x - x*|, and 0 at x*, where it has none
+Real nash_error_rate(const View& view, int) {
+  const int n = view.loop->shape().actions();
+  const Real* x = view.state + view.loop->layout().x();
+  const Real* x_rate = view.rate + view.loop->layout().x();
+  const Real error = nash_error(x, view.x_star, n);
+  Real product = 0.0;
+  for (int p = 0; p < n; ++p) product += (x[p] - view.x_star[p]) * x_rate[p];
+  return error > 0.0 ? product / error : 0.0;
+}
+
+using Index = std::array<int, 3>;
+struct Element {
+  int slot;
+  Index index;
+};
+using Elements = std::vector<Element>;
+
+}  // namespace
+
+std::span<const SimpleType> simple_types() { return declared; }
+std::span<const Unit> units() { return known_units; }
+
+std::optional<Real> smallest(Range range) {
+  switch (range) {
+    case Range::any:
+      return std::nullopt;
+    case Range::non_negative:
+    case Range::tolerance:
+      return 0.0;
+    case Range::positive:
+      return std::numeric_limits<Real>::min();
+  }
+  return std::nullopt;
+}
+
+std::optional<Real> largest(Range range) {
+  if (range == Range::tolerance) return no_tolerance_above;
+  return std::nullopt;
+}
+
+bool contains(Range range, Real value) {
+  return std::isfinite(value) && value >= smallest(range).value_or(value) && value <= largest(range).value_or(value);
+}
+
+std::string_view expectation(Range range) {
+  switch (range) {
+    case Range::any:
+      return "a finite number";
+    case Range::non_negative:
+      return "a finite number of at least 0";
+    case Range::positive:
+      return "a positive finite number";
+    case Range::tolerance:
+      return "0 (not set) or a positive number of at most 0.1";
+  }
+  return "";
+}
+
+std::string text_of(Real value) {
+  char text[32];
+  const auto result = std::to_chars(text, text + sizeof text, value);
+  return {text, result.ptr};
+}
+
+/// Adds the families in the order of the table.
+class ModelVariables::Builder {
+ public:
+  Builder(ModelVariables& table, const Game& game)
+      : table_(table), game_(game), shape_(game.parameters.shape), n_(shape_.actions()) {}
+
+  void add_all() {
+    add({.name = "time",
+         .description = "Time",
+         .causality = Causality::independent,
+         .initial = Initial::none,
+         .declared_type = "Time",
+         .unit = {"s", "s"},
+         .stage = Stage::state,
+         .read = [](const View& view, int) { return view.time; }},
+        one());
+    add_gains();
+    add_network();
+    add_graph();
+    add_costs();
+    add_perturbations();
+    add_switches();
+    add_initial_state();
+    add_tolerances();
+    add_input();
+    add_outputs();
+    add_inside_of_the_loop();
+    add_solver();
+  }
+
+ private:
+  static Elements one() { return {{0, {}}}; }
+
+  Elements players() const {
+    Elements elements;
+    for (int i = 0; i < shape_.players; ++i) elements.push_back({i, {i + 1}});
+    return elements;
+  }
+  // [i,l] for players of an order; 0: for all
+  Elements actions(int order = 0) const {
+    Elements elements;
+    for (int i = 0; i < shape_.players; ++i) {
+      if (order != 0 && shape_.order[at(i)] != order) continue;
+      for (int l = 0; l < shape_.dimension; ++l) elements.push_back({shape_.entry(i, l), {i + 1, l + 1}});
+    }
+    return elements;
+  }
+  Elements estimates() const {
+    Elements elements;
+    for (int i = 0; i < shape_.players; ++i) {
+      for (int j = 0; j < shape_.players; ++j) {
+        for (int l = 0; l < shape_.dimension; ++l) {
+          elements.push_back({i * n_ + shape_.entry(j, l), {i + 1, j + 1, l + 1}});
+        }
+      }
+    }
+    return elements;
+  }
+  Elements weights() const {
+    Elements elements;
+    for (int i = 0; i < shape_.players; ++i) {
+      for (int m = 0; m < shape_.neurons; ++m) {
+        for (int l = 0; l < shape_.dimension; ++l) {
+          elements.push_back({m * n_ + shape_.entry(i, l), {i + 1, m + 1, l + 1}});
+        }
+      }
+    }
+    return elements;
+  }
+
+  void add(Family family, const Elements& elements) {
+    family.first = table_.size();
+    family.count = static_cast<int>(elements.size());
+    const int number = static_cast<int>(table_.families_.size());
+    for (const auto& [slot, index] : elements) table_.variables_.push_back({number, slot, index});
+    table_.families_.push_back(std::move(family));
+  }
+  int last_family() const { return static_cast<int>(table_.families_.size()) - 1; }
+  bool everything() const { return game_.expose == Expose::all; }
+
+  static Family parameter(const char* name, const char* description, Variability variability) {
+    Family family;
+    family.name = name;
+    family.description = description;
+    family.causality = Causality::parameter;
+    family.variability = variability;
+    family.initial = Initial::exact;
+    return family;
+  }
+  template <auto Member>
+  void add_gain(const char* name, const char* description, const char* unit, Range range) {
+    Family family = parameter(name, description, Variability::tunable);
+    family.declared_type = "Gain";
+    family.unit = {unit, unit};
+    family.range = range;
+    family.read = read_gain<Member>;
+    family.write = write_gain<Member>;
+    add(std::move(family), one());
+  }
+  template <auto Member>
+  void add_cost(const char* name, const char* description, const Elements& elements) {
+    Family family = parameter(name, description, Variability::tunable);
+    family.declared_type = "CostCoefficient";
+    family.unit = {"1", "1"};
+    family.moves_equilibrium = true;
+    family.read = read_cost<Member>;
+    family.write = write_cost<Member>;
+    add(std::move(family), elements);
+  }
+  template <auto Member>
+  void add_disturbance(const char* name, const char* description, const char* type, std::array<const char*, 2> unit) {
+    Family family = parameter(name, description, Variability::tunable);
+    family.declared_type = type;
+    family.unit = unit;
+    family.read = read_disturbance<Member>;
+    family.write = write_disturbance<Member>;
+    add(std::move(family), actions());
+  }
+  template <auto Member>
+  void add_initial(const char* name, const char* description, const char* type, const char* unit,
+                   const Elements& elements) {
+    Family family = parameter(name, description, Variability::fixed);
+    family.declared_type = type;
+    family.unit = {unit, unit};
+    family.read = read_initial<Member>;
+    family.write = write_initial<Member>;
+    add(std::move(family), elements);
+  }
+
+  void add_gains() {
+    add_gain<&Gains::k1>("k1", "Regulation gain of players of order 1", "1/s", Range::positive);
+    add_gain<&Gains::k2>("k2", "Gradient gain", "1/s", Range::positive);
+    add_gain<&Gains::k3>("k3", "Consensus gain of the estimates", "1/s", Range::positive);
+    add_gain<&Gains::k4>("k4", "Velocity feedback gain of players of order 2", "1/s", Range::positive);
+    add_gain<&Gains::beta>("beta", "Adaptation gain of the network weights", "1/s2", Range::non_negative);
+    add_gain<&Gains::delta>("delta", "Amplitude of the robust term", nullptr, Range::non_negative);
+    add_gain<&Gains::epsilon>("epsilon", "Width of the robust term", nullptr, Range::positive);
+  }
+
+  void add_network() {
+    Family W_max = parameter("W_max", "Bound of the squared norm of each weight column", Variability::fixed);
+    W_max.range = Range::positive;
+    W_max.read = [](const View& view, int) { return view.settings->parameters.rbf.W_max; };
+    W_max.write = [](Settings& settings, int, Real value) { settings.parameters.rbf.W_max = value; };
+    add(std::move(W_max), one());
+
+    Family rho = parameter("rho", "Width of the radial basis functions", Variability::fixed);
+    rho.declared_type = "Action";
+    rho.unit = {"1", "1"};
+    rho.range = Range::positive;
+    rho.read = [](const View& view, int) { return view.settings->parameters.rbf.width; };
+    rho.write = [](Settings& settings, int, Real value) { settings.parameters.rbf.width = value; };
+    add(std::move(rho), one());
+
+    if (!game_.parameters.rbf.diagonal) return;
+    Family center = parameter("center", "Every entry of the center of neuron m", Variability::fixed);
+    center.declared_type = "Action";
+    center.unit = {"1", "1"};
+    center.read = [](const View& view, int m) { return view.settings->parameters.rbf.centers[at(m)]; };
+    center.write = [](Settings& settings, int m, Real value) { settings.parameters.rbf.centers[at(m)] = value; };
+    Elements neurons;
+    for (int m = 0; m < shape_.neurons; ++m) neurons.push_back({m, {m + 1}});
+    add(std::move(center), neurons);
+  }
+
+  void add_graph() {
+    Family family = parameter("a", "Weight of the edge between players i and j", Variability::tunable);
+    family.declared_type = "EdgeWeight";
+    family.unit = {"1", "1"};
+    family.range = Range::non_negative;
+    family.read = [](const View& view, int slot) {
+      const CommunicationGraph& graph = view.settings->parameters.graph;
+      return graph.weight(slot / graph.players(), slot % graph.players());
+    };
+    family.write = [](Settings& settings, int slot, Real value) {
+      CommunicationGraph& graph = settings.parameters.graph;
+      graph.set_weight(slot / graph.players(), slot % graph.players(), value);
+    };
+    Elements pairs;
+    for (int i = 0; i < shape_.players; ++i) {
+      for (int j = i + 1; j < shape_.players; ++j) {
+        if (!everything() && game_.parameters.graph.weight(i, j) == 0.0) continue;
+        pairs.push_back({i * shape_.players + j, {i + 1, j + 1}});
+      }
+    }
+    add(std::move(family), pairs);
+  }
+
+  void add_costs() {
+    const auto& cost = static_cast<const QuadraticCost&>(*game_.parameters.cost);
+    Elements pairs;
+    for (int i = 0; i < shape_.players; ++i) {
+      for (int j = 0; j < shape_.players; ++j) {
+        const int slot = i * shape_.players + j;
+        if (i == j || (!everything() && cost.coupling[at(slot)] == 0.0)) continue;
+        pairs.push_back({slot, {i + 1, j + 1}});
+      }
+    }
+    add_cost<&QuadraticCost::quadratic>("cost_quadratic", "Coefficient of |x_i|^2 in f_i", players());
+    add_cost<&QuadraticCost::linear>("cost_linear", "Coefficient of x_il in f_i", actions());
+    add_cost<&QuadraticCost::coupling>("cost_coupling", "Coefficient of |x_i - x_j|^2 in f_i", pairs);
+  }
+
+  void add_perturbations() {
+    Family gain = parameter("dynamics_gain", "Scales the unknown dynamics g_i", Variability::tunable);
+    gain.unit = {"1", "1"};
+    gain.read = [](const View& view, int i) { return dynamics_in(view).gain[at(i)]; };
+    gain.write = [](Settings& settings, int i, Real value) { dynamics_of(settings.parameters).gain[at(i)] = value; };
+    add(std::move(gain), players());
+    add_disturbance<&SinusoidalDisturbance::amplitude>("disturbance_amplitude", "Amplitude of d_il(t)", "Drive", drive);
+    add_disturbance<&SinusoidalDisturbance::frequency>("disturbance_frequency", "Angular frequency of d_il(t)",
+                                                       "AngularFrequency", {"rad/s", "rad/s"});
+    add_disturbance<&SinusoidalDisturbance::phase>("disturbance_phase", "Phase of d_il(t)", "Phase", {"rad", "rad"});
+    add_disturbance<&SinusoidalDisturbance::bias>("disturbance_bias", "Mean of d_il(t)", "Drive", drive);
+  }
+
+  void add_switches() {
+    Family robust = parameter("robust", "Neural network and robust term are in the control", Variability::fixed);
+    robust.type = Type::boolean;
+    robust.read = [](const View& view, int) { return view.settings->parameters.strategy.robust ? 1.0 : 0.0; };
+    robust.write = [](Settings& settings, int, Real value) { settings.parameters.strategy.robust = value != 0.0; };
+    add(std::move(robust), one());
+
+    Family perturbed = parameter("perturbed", "Unknown dynamics and disturbance are in the plants", Variability::fixed);
+    perturbed.type = Type::boolean;
+    perturbed.read = [](const View& view, int) { return view.settings->parameters.strategy.perturbed ? 1.0 : 0.0; };
+    perturbed.write = [](Settings& settings, int, Real value) {
+      settings.parameters.strategy.perturbed = value != 0.0;
+    };
+    add(std::move(perturbed), one());
+
+    Family allow =
+        parameter("allow_disconnected", "Accept a communication graph that is not connected", Variability::fixed);
+    allow.type = Type::boolean;
+    allow.read = [](const View& view, int) { return view.settings->allow_disconnected ? 1.0 : 0.0; };
+    allow.write = [](Settings& settings, int, Real value) { settings.allow_disconnected = value != 0.0; };
+    add(std::move(allow), one());
+  }
+
+  void add_initial_state() {
+    add_initial<&InitialState::x>("x0", "Initial action", "Action", "1", actions());
+    add_initial<&InitialState::reference>("v0", "Initial velocity", "Velocity", "1/s", actions(2));
+    add_initial<&InitialState::reference>("z0", "Initial reference", "Action", "1", actions(1));
+    if (everything()) {
+      add_initial<&InitialState::y>("y0", "Initial estimate by player i of the action of player j", "Action", "1",
+                                    estimates());
+    }
+  }
+
+  void add_tolerances() {
+    Family relative = parameter("tolerance_relative", "Relative tolerance of the integrator; 0: that of the experiment",
+                                Variability::fixed);
+    relative.unit = {"1", "1"};
+    relative.range = Range::tolerance;
+    relative.read = [](const View& view, int) { return view.settings->tolerance_relative; };
+    relative.write = [](Settings& settings, int, Real value) { settings.tolerance_relative = value; };
+    add(std::move(relative), one());
+
+    Family absolute =
+        parameter("tolerance_absolute", "Absolute tolerance of the integrator; 0: a hundredth of the relative one",
+                  Variability::fixed);
+    absolute.range = Range::non_negative;
+    absolute.read = [](const View& view, int) { return view.settings->tolerance_absolute; };
+    absolute.write = [](Settings& settings, int, Real value) { settings.tolerance_absolute = value; };
+    add(std::move(absolute), one());
+  }
+
+  void add_input() {
+    add({.name = "d_ext",
+         .description = "External disturbance, added to d_il(t)",
+         .causality = Causality::input,
+         .initial = Initial::exact,
+         .declared_type = "Drive",
+         .unit = drive,
+         .stage = Stage::input,
+         .read = [](const View& view, int slot) { return view.d_ext[slot]; },
+         .write = [](Settings& settings, int slot, Real value) { settings.input.set_value(slot, value); }},
+        actions());
+  }
+
+  void add_outputs() {
+    add({.name = "x",
+         .description = "Action",
+         .causality = Causality::output,
+         .declared_type = "Action",
+         .unit = {"1", "1"},
+         .nominal = 1.0,
+         .stage = Stage::state,
+         .read = read_state<&StateLayout::x>,
+         .read_derivative = read_rate<&StateLayout::x>},
+        actions());
+    x_ = last_family();
+    add({.name = "v",
+         .description = "Velocity",
+         .causality = Causality::output,
+         .declared_type = "Velocity",
+         .unit = {"1/s", "1/s"},
+         .nominal = 1.0,
+         .stage = Stage::state,
+         .read = read_state<&StateLayout::reference>,
+         .read_derivative = read_rate<&StateLayout::reference>},
+        actions(2));
+    v_ = last_family();
+    add({.name = "u",
+         .description = "Control input of the plant",
+         .causality = Causality::output,
+         .declared_type = "Drive",
+         .unit = drive,
+         .stage = Stage::signals,
+         .read = read_signal<&Signals::control>,
+         .read_derivative = [](const View& view, int slot) { return view.control_rate[slot]; }},
+        actions());
+    add({.name = "nash_error",
+         .description = "Distance from the Nash equilibrium: 2-norm of x - x_star",
+         .causality = Causality::output,
+         .declared_type = "Action",
+         .unit = {"1", "1"},
+         .stage = Stage::equilibrium,
+         .read =
+             [](const View& view, int) {
+               return nash_error(view.state + view.loop->layout().x(), view.x_star, view.loop->shape().actions());
+             },
+         .read_derivative = nash_error_rate},
+        one());
+    add({.name = "x_star",
+         .description = "Nash equilibrium",
+         .causality = Causality::calculated_parameter,
+         .variability = Variability::tunable,
+         .declared_type = "Action",
+         .unit = {"1", "1"},
+         .stage = Stage::equilibrium,
+         .read = [](const View& view, int slot) { return view.x_star[slot]; }},
+        actions());
+  }
+
+  void add_inside_of_the_loop() {
+    const Real W_nominal = std::sqrt(game_.parameters.rbf.W_max);
+    add({.name = "z",
+         .description = "Reference of a player of order 1",
+         .declared_type = "Action",
+         .unit = {"1", "1"},
+         .nominal = 1.0,
+         .stage = Stage::state,
+         .read = read_state<&StateLayout::reference>},
+        actions(1));
+    const int z = last_family();
+    int y = -1;
+    int W = -1;
+    if (everything()) {
+      add({.name = "y",
+           .description = "Estimate by player i of the action of player j",
+           .declared_type = "Action",
+           .unit = {"1", "1"},
+           .nominal = 1.0,
+           .stage = Stage::state,
+           .read = read_state<&StateLayout::estimates>},
+          estimates());
+      y = last_family();
+      add({.name = "W",
+           .description = "Network weight of player i, neuron m, coordinate l",
+           .declared_type = "Weight",
+           .unit = drive,
+           .nominal = W_nominal,
+           .stage = Stage::state,
+           .read = read_state<&StateLayout::weights>},
+          weights());
+      W = last_family();
+    }
+    add({.name = "W_norm2",
+         .description = "Squared norm of a weight column, at most W_max",
+         .unit = {"1/s2", "1/s4"},
+         .stage = Stage::state,
+         .read =
+             [](const View& view, int slot) {
+               Real squares = 0.0;
+               for (int m = 0; m < view.loop->shape().neurons; ++m) {
+                 const Real w = view.state[view.loop->layout().weights_of(m) + slot];
+                 squares += w * w;
+               }
+               return squares;
+             }},
+        actions());
+    add({.name = "phi",
+         .description = "Robust term of the control",
+         .declared_type = "Drive",
+         .unit = drive,
+         .stage = Stage::signals,
+         .read = read_signal<&Signals::robust>},
+        actions());
+    add({.name = "nn",
+         .description = "Output of the neural network",
+         .declared_type = "Drive",
+         .unit = drive,
+         .stage = Stage::signals,
+         .read = read_signal<&Signals::network>},
+        actions());
+    add({.name = "cost",
+         .description = "Cost f_i(x)",
+         .stage = Stage::state,
+         .read = [](const View& view,
+                    int i) { return view.loop->parameters().cost->value(i, view.state + view.loop->layout().x()); }},
+        players());
+    add({.name = "consensus_error",
+         .description = "2-norm of all errors of the estimates",
+         .declared_type = "Action",
+         .unit = {"1", "1"},
+         .stage = Stage::signals,
+         .read = [](const View& view, int) { return consensus_error(*view.loop, view.state, *view.signals); }},
+        one());
+    add({.name = "gradient_norm",
+         .description = "2-norm of the own-action gradients at x",
+         .stage = Stage::state,
+         .read = [](const View& view, int) { return gradient_norm(*view.loop, view.state + view.loop->layout().x()); }},
+        one());
+    if (everything()) {
+      add_derivatives<&StateLayout::x>(x_, {"1/s", "1/s"}, actions());
+      add_derivatives<&StateLayout::reference>(v_, {"1/s2", "1/s2"}, actions(2));
+      add_derivatives<&StateLayout::reference>(z, {"1/s", "1/s"}, actions(1));
+      add_derivatives<&StateLayout::estimates>(y, {"1/s", "1/s"}, estimates());
+      add_derivatives<&StateLayout::weights>(W, {"1/s2", "1/s3"}, weights());
+    }
+  }
+
+  template <auto Offset>
+  void add_derivatives(int states, std::array<const char*, 2> unit, const Elements& elements) {
+    const Family& family = table_.families_[at(states)];
+    add({.name = "der(" + family.name,
+         .description = "Time derivative of " + family.name,
+         .unit = unit,
+         .stage = Stage::signals,
+         .derivative_of = states,
+         .read = read_rate<Offset>},
+        elements);
+  }
+
+  void add_solver() {
+    const auto add_count = [&](const char* name, const char* description, Real (*read)(const View&, int)) {
+      add({.name = name,
+           .description = description,
+           .type = Type::integer,
+           .variability = Variability::discrete,
+           .declared_type = "Count",
+           .range = Range::non_negative,
+           .stage = Stage::state,
+           .read = read},
+          one());
+    };
+    add_count("solver_steps", "Steps taken by the integrator", read_count<&Statistics::steps>);
+    add_count("solver_rhs_evaluations", "Evaluations of the right-hand side",
+              read_count<&Statistics::rate_evaluations>);
+    add_count("solver_events", "Weight columns that entered or left the sphere", read_count<&Statistics::events>);
+    add({.name = "order",
+         .description = "Order of player i: 1 velocity-driven, 2 acceleration-driven",
+         .type = Type::integer,
+         .variability = Variability::constant,
+         .initial = Initial::exact,
+         .declared_type = "Order",
+         .stage = Stage::settings,
+         .read = [](const View& view,
+                    int i) { return static_cast<Real>(view.settings->parameters.shape.order[at(i)]); }},
+        players());
+  }
+
+  static constexpr std::array<const char*, 2> drive{"1/s", "1/s2"};
+
+  ModelVariables& table_;
+  const Game& game_;
+  const Shape& shape_;
+  int n_;
+  int x_ = -1;
+  int v_ = -1;
+};
+
+ModelVariables::ModelVariables(const Game& game) : order_(game.parameters.shape.order) {
+  Builder(*this, game).add_all();
+  for (int reference = 0; reference < size(); ++reference) {
+    if (family(reference).causality == Causality::parameter) settable_.push_back(reference);
+  }
+  input_numbers_ = ExternalDisturbance(game.parameters.shape.actions()).numbers().size();
+}
+
+std::string ModelVariables::name(int reference) const {
+  const Family& of = family(reference);
+  std::string text = of.name;
+  const auto& index = variable(reference).index;
+  for (std::size_t k = 0; k < index.size() && index[k] != 0; ++k) {
+    text += k == 0 ? '[' : ',';
+    text += std::to_string(index[k]);
+  }
+  if (index[0] != 0) text += ']';
+  if (of.derivative_of >= 0) text += ')';
+  return text;
+}
+
+const char* ModelVariables::unit(int reference) const {
+  const int player = variable(reference).index[0];
+  return family(reference).unit[player > 0 && at(player) <= order_.size() && order_[at(player - 1)] == 2 ? 1 : 0];
+}
+
+const Family* ModelVariables::find(std::string_view name) const {
+  const auto found =
+      std::find_if(families_.begin(), families_.end(), [&](const Family& family) { return family.name == name; });
+  return found == families_.end() ? nullptr : &*found;
+}
+
+std::optional<int> ModelVariables::find(std::string_view name, int slot) const {
+  const Family* found = find(name);
+  if (found == nullptr) return std::nullopt;
+  for (int reference = found->first; reference < found->first + found->count; ++reference) {
+    if (variable(reference).slot == slot) return reference;
+  }
+  return std::nullopt;
+}
+
+std::vector<Real> ModelVariables::save(const Settings& settings) const {
+  View view;
+  view.settings = &settings;
+  std::vector<Real> numbers;
+  numbers.reserve(saved_size());
+  for (const int reference : settable_) numbers.push_back(read(reference, view));
+  const std::span<const Real> input = settings.input.numbers();
+  numbers.insert(numbers.end(), input.begin(), input.end());
+  return numbers;
+}
+
+void ModelVariables::load(std::span<const Real> numbers, Settings& settings) const {
+  for (std::size_t k = 0; k < settable_.size(); ++k) {
+    family(settable_[k]).write(settings, variable(settable_[k]).slot, numbers[k]);
+  }
+  settings.input.set_numbers(numbers.subspan(settable_.size()));
+  settings.parameters.refresh();
+}
+
+}  // namespace mixed_order_game

@@ -1,0 +1,125 @@
+// THE table of the FMU's variables: each is registered once, and that drives reading, setting, modelDescription.xml
+// and the serialized state alike.
+//
+// Variables come in families, as x[i,l]. A value reference is a variable's position in the table.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "settings.hpp"
+
+namespace mixed_order_game {
+
+enum class Type : std::uint8_t { real, integer, boolean };
+enum class Causality : std::uint8_t { parameter, calculated_parameter, input, output, local, independent };
+enum class Variability : std::uint8_t { constant, fixed, tunable, discrete, continuous };
+enum class Initial : std::uint8_t { none, exact, calculated };
+
+/// Which values may be set.
+enum class Range : std::uint8_t { any, non_negative, positive, tolerance };
+
+/// Declared types of modelDescription.xml.
+struct SimpleType {
+  const char* name;
+  Type type;
+  const char* unit;  ///< null when it depends on the player's order or has none
+  const char* description;
+  std::optional<int> min = std::nullopt;
+  std::optional<int> max = std::nullopt;
+};
+std::span<const SimpleType> simple_types();
+
+/// Units of modelDescription.xml, as powers of the base units.
+struct Unit {
+  const char* name;
+  int seconds;
+  int radians;
+};
+std::span<const Unit> units();
+
+struct Family {
+  std::string name;
+  std::string description;
+  Type type = Type::real;
+  Causality causality = Causality::local;
+  Variability variability = Variability::continuous;
+  Initial initial = Initial::calculated;
+  const char* declared_type = nullptr;
+  std::array<const char*, 2> unit{};  ///< for players of order 1 and of order 2; null: none
+  Range range = Range::any;
+  Real nominal = 0.0;  ///< 0: not stated
+  Stage stage = Stage::settings;
+  bool moves_equilibrium = false;
+  int derivative_of = -1;  ///< family of states of which this one holds the derivatives, element by element
+
+  /// Value of the element at a slot; Integer and Boolean values are exact in a Real.
+  Real (*read)(const View& view, int slot) = nullptr;
+  /// Null when it cannot be set.
+  void (*write)(Settings& settings, int slot, Real value) = nullptr;
+
+  /// Time derivative of an output.
+  Real (*read_derivative)(const View& view, int slot) = nullptr;
+
+  int first = 0;  ///< value references first .. first + count - 1
+  int count = 0;
+};
+
+struct Variable {
+  int family = 0;
+  int slot = 0;                ///< position in the arrays of the core
+  std::array<int, 3> index{};  ///< public indices, from one; 0 where there is none
+};
+
+class ModelVariables {
+ public:
+  explicit ModelVariables(const Game& game);
+
+  [[nodiscard]] int size() const { return static_cast<int>(variables_.size()); }
+  [[nodiscard]] const std::vector<Family>& families() const { return families_; }
+  [[nodiscard]] const Variable& variable(int reference) const { return variables_[at(reference)]; }
+  [[nodiscard]] const Family& family(int reference) const { return families_[at(variable(reference).family)]; }
+  [[nodiscard]] std::string name(int reference) const;
+  /// Null when there is none.
+  [[nodiscard]] const char* unit(int reference) const;
+  [[nodiscard]] const Family* find(std::string_view family) const;
+  /// Value reference of an element by its slot, when it is a variable.
+  [[nodiscard]] std::optional<int> find(std::string_view family, int slot) const;
+
+  [[nodiscard]] Real read(int reference, const View& view) const {
+    return family(reference).read(view, variable(reference).slot);
+  }
+
+  /// All settings as numbers, in the order of the table, followed by the input polynomials.
+  [[nodiscard]] std::vector<Real> save(const Settings& settings) const;
+  void load(std::span<const Real> numbers, Settings& settings) const;
+  [[nodiscard]] std::size_t saved_size() const { return settable_.size() + input_numbers_; }
+  /// How many of the saved numbers come before the input polynomials.
+  [[nodiscard]] std::size_t saved_parameters() const { return settable_.size(); }
+
+ private:
+  class Builder;
+
+  std::vector<Family> families_;
+  std::vector<Variable> variables_;
+  std::vector<int> settable_;  // parameters that can be set
+  std::size_t input_numbers_ = 0;
+  std::vector<int> order_;  // of the players
+};
+
+/// Smallest and largest value of a range, when it has one, as modelDescription.xml states it.
+std::optional<Real> smallest(Range range);
+std::optional<Real> largest(Range range);
+bool contains(Range range, Real value);
+/// As in "a positive number".
+std::string_view expectation(Range range);
+
+/// The shortest text that reads back as the same number.
+std::string text_of(Real value);
+
+}  // namespace mixed_order_game

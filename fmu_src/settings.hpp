@@ -1,0 +1,44 @@
+// Everything that an importer sets (parameters, tolerances, inputs) and everything that it can read besides.
+#pragma once
+
+#include "closed_loop.hpp"
+#include "external_disturbance.hpp"
+#include "game.hpp"
+#include "integrator.hpp"
+
+namespace mixed_order_game {
+
+struct Settings {
+  explicit Settings(const Game& game) : parameters(game.parameters), input(game.parameters.shape.actions()) {}
+
+  Parameters parameters;
+  bool allow_disconnected = false;
+  Real tolerance_relative = 0.0;  ///< 0: not set
+  Real tolerance_absolute = 0.0;  ///< 0: not set
+  ExternalDisturbance input;      ///< d_ext
+};
+
+/// What has to be computed before a variable can be read.
+enum class Stage {
+  settings,     ///< nothing
+  input,        ///< d_ext
+  state,        ///< time and state
+  signals,      ///< signals and rates of the closed loop
+  equilibrium,  ///< state and x_star
+};
+
+/// The sources of all variables; only those of the stages asked for are valid.
+struct View {
+  const Settings* settings = nullptr;
+  const ClosedLoop* loop = nullptr;
+  Real time = 0.0;
+  const Real* d_ext = nullptr;
+  const Real* state = nullptr;
+  const Real* rate = nullptr;
+  const Signals* signals = nullptr;
+  const Real* control_rate = nullptr;  ///< u', only for derivatives of outputs
+  const Real* x_star = nullptr;
+  Statistics statistics;
+};
+
+}  // namespace mixed_order_game

@@ -1,0 +1,243 @@
+#include "snapshot.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <concepts>
+
+#include "errors.hpp"
+#include "fingerprint.hpp"
+
+namespace mixed_order_game {
+
+namespace {
+
+constexpr std::string_view magic = "MOGstate";
+constexpr std::uint32_t format = 1;
+constexpr std::size_t fingerprint_size = 16;
+
+class Writer {
+ public:
+  void byte(std::uint8_t value) { bytes_.push_back(static_cast<char>(value)); }
+  void number(std::uint32_t value) { little_endian(value, 4); }
+  void number(std::uint64_t value) { little_endian(value, 8); }
+  void number(std::int64_t value) { little_endian(static_cast<std::uint64_t>(value), 8); }
+  void number(Real value) { little_endian(std::bit_cast<std::uint64_t>(value), 8); }
+  void text(std::string_view text) { bytes_.insert(bytes_.end(), text.begin(), text.end()); }
+  template <typename Numbers>
+  void numbers(const Numbers& values) {
+    number(std::uint64_t{values.size()});
+    for (const Real value : values) number(value);
+  }
+  void optional(const std::optional<Real>& value) {
+    byte(value ? 1 : 0);
+    number(value.value_or(0.0));
+  }
+  void seal() {
+    Fingerprint fingerprint;
+    fingerprint.add({bytes_.data(), bytes_.size()});
+    for (const std::uint32_t part : fingerprint.value()) number(part);
+  }
+  std::vector<char>& bytes() { return bytes_; }
+
+ private:
+  void little_endian(std::uint64_t value, int count) {
+    for (int k = 0; k < count; ++k) byte(static_cast<std::uint8_t>(value >> (8 * k) & 0xFF));
+  }
+
+  std::vector<char> bytes_;
+};
+
+class Reader {
+ public:
+  explicit Reader(std::span<const char> bytes) : bytes_(bytes) {}
+
+  std::uint8_t byte() { return static_cast<std::uint8_t>(take(1)[0]); }
+  std::uint64_t number(int count = 8) {
+    const auto bytes = take(static_cast<std::size_t>(count));
+    std::uint64_t value = 0;
+    for (int k = 0; k < count; ++k) {
+      value |= std::uint64_t{static_cast<unsigned char>(bytes[static_cast<std::size_t>(k)])} << (8 * k);
+    }
+    return value;
+  }
+  Real real() {
+    const Real value = std::bit_cast<Real>(number());
+    if (!std::isfinite(value)) refuse("a number in it is not finite");
+    return value;
+  }
+  std::string_view text(std::size_t length) {
+    const auto bytes = take(length);
+    return {bytes.data(), bytes.size()};
+  }
+  template <typename Numbers>
+  void numbers(std::size_t expected, Numbers& values) {
+    if (number() != expected) refuse("a list in it has another length");
+    values.resize(expected);
+    for (Real& value : values) value = real();
+  }
+  bool boolean() {
+    const std::uint8_t value = byte();
+    if (value > 1) refuse("a flag in it is neither 0 nor 1");
+    return value == 1;
+  }
+  std::optional<Real> optional() {
+    const bool present = boolean();
+    const Real value = real();
+    return present ? std::optional(value) : std::nullopt;
+  }
+  [[nodiscard]] std::size_t left() const { return bytes_.size() - position_; }
+
+  [[noreturn]] static void refuse(const std::string& reason) {
+    throw Error("the bytes are not a state of this FMU: " + reason);
+  }
+
+ private:
+  std::span<const char> take(std::size_t count) {
+    if (count > left()) refuse("they end too early");
+    position_ += count;
+    return bytes_.subspan(position_ - count, count);
+  }
+
+  std::span<const char> bytes_;
+  std::size_t position_ = 0;
+};
+
+void write_header(Writer& writer, std::string_view guid, std::uint64_t payload) {
+  writer.text(magic);
+  writer.number(format);
+  writer.number(static_cast<std::uint32_t>(guid.size()));
+  writer.text(guid);
+  writer.number(payload);
+}
+
+void write_modes(Writer& writer, const Modes& modes) {
+  writer.number(std::uint64_t{modes.size()});
+  for (const std::uint8_t mode : modes) writer.byte(mode);
+}
+
+void write_statistics(Writer& writer, const Statistics& statistics) {
+  for (const std::int64_t count : {statistics.steps, statistics.rate_evaluations, statistics.newton_setups,
+                                   statistics.newton_solves, statistics.events}) {
+    writer.number(count);
+  }
+}
+
+void write_payload(Writer& writer, const Snapshot& snapshot) {
+  writer.byte(static_cast<std::uint8_t>(snapshot.phase));
+  writer.optional(snapshot.experiment.tolerance);
+  writer.number(snapshot.experiment.start_time);
+  writer.optional(snapshot.experiment.stop_time);
+  writer.numbers(snapshot.settings);
+  writer.byte(snapshot.checkpoint ? 1 : 0);
+  if (!snapshot.checkpoint) return;
+  const Checkpoint& checkpoint = *snapshot.checkpoint;
+  writer.numbers(snapshot.applied);
+  writer.number(checkpoint.restart_time);
+  writer.numbers(checkpoint.restart_state);
+  write_modes(writer, checkpoint.restart_modes);
+  write_statistics(writer, checkpoint.restart_statistics);
+  writer.number(checkpoint.steps_since_restart);
+  writer.number(checkpoint.time);
+  writer.numbers(checkpoint.state);
+  write_modes(writer, checkpoint.modes);
+  write_statistics(writer, checkpoint.statistics);
+}
+
+std::int64_t read_count(Reader& reader) {
+  const auto count = static_cast<std::int64_t>(reader.number());
+  if (count < 0) Reader::refuse("a count in it is negative");
+  return count;
+}
+
+void read_modes(Reader& reader, std::size_t expected, Modes& modes) {
+  if (reader.number() != expected) Reader::refuse("a list in it has another length");
+  for (std::size_t k = 0; k < expected; ++k) modes.push_back(static_cast<std::uint8_t>(reader.boolean()));
+}
+
+void read_statistics(Reader& reader, Statistics& statistics) {
+  for (std::int64_t* count : {&statistics.steps, &statistics.rate_evaluations, &statistics.newton_setups,
+                              &statistics.newton_solves, &statistics.events}) {
+    *count = read_count(reader);
+  }
+}
+
+Checkpoint read_checkpoint(Reader& reader, const SnapshotSizes& sizes) {
+  Checkpoint checkpoint;
+  checkpoint.restart_time = reader.real();
+  reader.numbers(sizes.states, checkpoint.restart_state);
+  read_modes(reader, sizes.modes, checkpoint.restart_modes);
+  read_statistics(reader, checkpoint.restart_statistics);
+  checkpoint.steps_since_restart = read_count(reader);
+  checkpoint.time = reader.real();
+  reader.numbers(sizes.states, checkpoint.state);
+  read_modes(reader, sizes.modes, checkpoint.modes);
+  read_statistics(reader, checkpoint.statistics);
+  if (checkpoint.time < checkpoint.restart_time) Reader::refuse("its times are out of order");
+  return checkpoint;
+}
+
+}  // namespace
+
+std::size_t serialized_size(const Snapshot& snapshot, std::string_view guid) {
+  // phase, experiment, settings, flag
+  std::size_t size = 1 + 9 + 8 + 9 + 8 + 8 * snapshot.settings.size() + 1;
+  if (const auto& checkpoint = snapshot.checkpoint) {
+    constexpr std::size_t statistics = 5 * 8;
+    size += 8 + 8 * snapshot.applied.size() + 8;
+    size += 8 + 8 * checkpoint->restart_state.size() + 8 + checkpoint->restart_modes.size() + statistics + 8;
+    size += 8 + 8 + 8 * checkpoint->state.size() + 8 + checkpoint->modes.size() + statistics;
+  }
+  return magic.size() + 4 + 4 + guid.size() + 8 + size + fingerprint_size;
+}
+
+std::vector<char> to_bytes(const Snapshot& snapshot, std::string_view guid) {
+  const std::size_t size = serialized_size(snapshot, guid);
+  const std::size_t header = magic.size() + 4 + 4 + guid.size() + 8;
+  Writer writer;
+  writer.bytes().reserve(size);
+  write_header(writer, guid, size - header - fingerprint_size);
+  write_payload(writer, snapshot);
+  writer.seal();
+  return std::move(writer.bytes());
+}
+
+Snapshot from_bytes(std::span<const char> bytes, std::string_view guid, const SnapshotSizes& sizes) {
+  Reader reader(bytes);
+  if (reader.text(magic.size()) != magic) Reader::refuse("they do not begin as one");
+  if (const auto version = reader.number(4); version != format) {
+    Reader::refuse("they have format " + std::to_string(version) + ", expected " + std::to_string(format));
+  }
+  if (reader.text(static_cast<std::size_t>(reader.number(4))) != guid) Reader::refuse("they carry another GUID");
+  const std::uint64_t payload = reader.number();
+  if (reader.left() < fingerprint_size || payload != reader.left() - fingerprint_size) {
+    Reader::refuse("their length does not match");
+  }
+  Fingerprint fingerprint;
+  fingerprint.add({bytes.data(), bytes.size() - fingerprint_size});
+  Reader seal(bytes.last(fingerprint_size));
+  for (const std::uint32_t part : fingerprint.value()) {
+    if (seal.number(4) != part) Reader::refuse("they are damaged (checksum)");
+  }
+
+  Snapshot snapshot;
+  const std::uint8_t phase = reader.byte();
+  if (phase >= phases) Reader::refuse("its phase is unknown");
+  snapshot.phase = static_cast<Phase>(phase);
+  snapshot.experiment.tolerance = reader.optional();
+  snapshot.experiment.start_time = reader.real();
+  snapshot.experiment.stop_time = reader.optional();
+  reader.numbers(sizes.settings, snapshot.settings);
+  if (reader.boolean()) {
+    reader.numbers(sizes.settings, snapshot.applied);
+    snapshot.checkpoint = read_checkpoint(reader, sizes);
+  }
+  const bool has_run = snapshot.phase == Phase::step_complete || snapshot.phase == Phase::terminated;
+  if (snapshot.phase == Phase::error || has_run != snapshot.checkpoint.has_value()) {
+    Reader::refuse("its phase and content do not match");
+  }
+  if (reader.left() != fingerprint_size) Reader::refuse("they are longer than their content");
+  return snapshot;
+}
+
+}  // namespace mixed_order_game

@@ -1,0 +1,97 @@
+// mixed-order-game-description: makes modelDescription.xml for a game, or checks a game.
+#include <getopt.h>
+#include <unistd.h>
+
+#include <cstdio>
+#include <fstream>
+#include <iostream>
+#include <string>
+
+#include "errors.hpp"
+#include "model_description.hpp"
+#include "resource_location.hpp"
+
+using namespace mixed_order_game;
+
+namespace {
+
+constexpr const char* usage =
+    "usage: mixed-order-game-description [--output FILE | --check] GAME.toml\n"
+    "\n"
+    "Writes modelDescription.xml of a game to standard output.\n"
+    "\n"
+    "  -o, --output FILE  write to FILE, which is replaced only when all went well\n"
+    "  -c, --check        only check the game\n"
+    "  -h, --help         show this text\n"
+    "\n"
+    "Exit code: 0 fine, 1 the game is not valid or a file cannot be read or written, 2 wrong usage.\n";
+
+enum Exit { fine = 0, failure = 1, wrong_usage = 2 };
+
+void write_whole(const std::string& path, const std::string& text) {
+  const std::string unfinished = path + "." + std::to_string(getpid()) + ".tmp";
+  {
+    std::ofstream file(unfinished, std::ios::binary);
+    file << text;
+    file.close();
+    if (file && std::rename(unfinished.c_str(), path.c_str()) == 0) return;
+  }
+  std::remove(unfinished.c_str());
+  throw Error("cannot write " + path);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const option options[] = {{"output", required_argument, nullptr, 'o'},
+                            {"check", no_argument, nullptr, 'c'},
+                            {"help", no_argument, nullptr, 'h'},
+                            {}};
+  std::string output;
+  bool check_only = false;
+  for (int option = 0; (option = getopt_long(argc, argv, "o:ch", options, nullptr)) != -1;) {
+    switch (option) {
+      case 'o':
+        output = optarg;
+        break;
+      case 'c':
+        check_only = true;
+        break;
+      case 'h':
+        std::cout << usage;
+        return fine;
+      default:
+        std::cerr << usage;
+        return wrong_usage;
+    }
+  }
+  if (optind + 1 != argc || (check_only && !output.empty())) {
+    std::cerr << usage;
+    return wrong_usage;
+  }
+  const std::string game = argv[optind];
+  try {
+    std::string toml;
+    try {
+      toml = content_of(game);
+    } catch (const Error& error) {
+      std::cerr << error.what() << '\n';
+      return failure;
+    }
+    const Model model(toml);
+    if (check_only) return fine;
+    const std::string xml = model_description(model);
+    if (!output.empty()) {
+      write_whole(output, xml);
+    } else {
+      std::cout << xml << std::flush;
+      if (!std::cout) throw Error("cannot write to standard output");
+    }
+    return fine;
+  } catch (const GameError& error) {
+    std::cerr << game << ": " << error.what() << '\n';
+  } catch (const std::exception& error) {
+    std::cerr << "mixed-order-game-description: " << error.what() << '\n';
+  }
+  return failure;
+}

@@ -1,0 +1,466 @@
+// Lifecycle, failed integrations, threads, exported symbols, hostile arguments and messages: behaviours 20 to 25.
+#include <dlfcn.h>
+
+#include <cfenv>
+#include <clocale>
+#include <cstdio>
+#include <filesystem>
+#include <set>
+#include <sstream>
+#include <thread>
+
+#include "errors.hpp"
+#include "fmi_logger.hpp"
+#include "resource_location.hpp"
+#include "slave.hpp"
+
+using namespace mixed_order_game;
+
+namespace {
+
+// x' = 1e3 x^2 blows up within milliseconds
+std::string exploding_game() {
+  return small_game_with({{"dimension = 2\n", "dimension = 2\n[strategy]\nrobust = false\n"},
+                          {"square = [[2, [0.05, 0.04]]]", "square = [[1, [1000.0, 0.0]]]"}});
+}
+
+std::string output_of(const std::string& command) {
+  std::string text;
+  FILE* pipe = popen(command.c_str(), "r");
+  if (pipe == nullptr) return text;
+  char line[512];
+  while (std::fgets(line, sizeof line, pipe) != nullptr) text += line;
+  pclose(pipe);
+  return text;
+}
+
+std::vector<double> course(Slave& slave) {
+  slave.initialize();
+  slave.run(0.0, 2.0, 40);
+  return slave.all();
+}
+
+}  // namespace
+
+TEST(Behaviour20Lifecycle, WrongOrderIsRefusedAndHarmless) {
+  Slave slave;
+  const fmi2Component c = slave.component;
+  const auto refused = [&](fmi2Status status) {
+    EXPECT_EQ(status, fmi2Error);
+    EXPECT_NE(slave.last_message().find("not allowed in the state"), std::string::npos) << slave.last_message();
+    slave.log.clear();
+  };
+  refused(fmi2ExitInitializationMode(c));
+  refused(fmi2DoStep(c, 0.0, 0.1, fmi2True));
+  refused(fmi2Terminate(c));
+  refused(fmi2CancelStep(c));
+  ASSERT_EQ(fmi2SetupExperiment(c, fmi2False, 0.0, 0.0, fmi2False, 0.0), fmi2OK);
+  ASSERT_EQ(fmi2EnterInitializationMode(c), fmi2OK);
+  refused(fmi2EnterInitializationMode(c));
+  refused(fmi2SetupExperiment(c, fmi2False, 0.0, 0.0, fmi2False, 0.0));
+  refused(fmi2DoStep(c, 0.0, 0.1, fmi2True));
+  refused(fmi2Terminate(c));
+  ASSERT_EQ(fmi2ExitInitializationMode(c), fmi2OK);
+  refused(fmi2ExitInitializationMode(c));
+  refused(fmi2EnterInitializationMode(c));
+  refused(fmi2SetupExperiment(c, fmi2False, 0.0, 0.0, fmi2False, 0.0));
+  refused(fmi2CancelStep(c));
+  ASSERT_EQ(slave.step(0.0, 0.1), fmi2OK) << "the state machine did not move";
+  ASSERT_EQ(fmi2Terminate(c), fmi2OK);
+  refused(fmi2Terminate(c));
+  refused(slave.step(0.1, 0.1));
+  refused(slave.set("k1", 1.0));
+  refused(slave.set("d_ext[1,1]", 1.0));
+  EXPECT_EQ(slave.get("time"), 0.1) << "reading still works";
+  ASSERT_EQ(fmi2Reset(c), fmi2OK);
+  slave.initialize();
+  EXPECT_EQ(slave.step(0.0, 0.1), fmi2OK);
+}
+
+TEST(Behaviour20Lifecycle, InputsCanBeSetAndAllReadRightAfterInstantiate) {
+  Slave slave;
+  EXPECT_EQ(slave.set("d_ext[1,1]", 1.0), fmi2OK);
+  EXPECT_EQ(slave.all().size(), static_cast<std::size_t>(slave.model().variables.size()));
+}
+
+TEST(Behaviour20Lifecycle, ModelExchangeIsRefusedWithItsReason) {
+  Slave slave;
+  const fmi2Component c = slave.component;
+  double values[100] = {};
+  fmi2Boolean flag = 0;
+  fmi2EventInfo info{};
+  const auto refused = [&](fmi2Status status) {
+    EXPECT_EQ(status, fmi2Error);
+    EXPECT_NE(slave.last_message().find("model exchange"), std::string::npos) << slave.last_message();
+  };
+  refused(fmi2EnterEventMode(c));
+  refused(fmi2NewDiscreteStates(c, &info));
+  refused(fmi2EnterContinuousTimeMode(c));
+  refused(fmi2CompletedIntegratorStep(c, fmi2True, &flag, &flag));
+  refused(fmi2SetTime(c, 0.0));
+  refused(fmi2SetContinuousStates(c, values, 100));
+  refused(fmi2GetDerivatives(c, values, 100));
+  refused(fmi2GetEventIndicators(c, values, 100));
+  refused(fmi2GetContinuousStates(c, values, 100));
+  refused(fmi2GetNominalsOfContinuousStates(c, values, 100));
+}
+
+TEST(Behaviour20FailedIntegration, IsAnErrorFromWhichResetAndRestoreHelp) {
+  Slave slave(exploding_game());
+  const fmi2Component c = slave.component;
+  slave.initialize();
+  ASSERT_EQ(slave.step(0.0, 1e-5), fmi2OK) << slave.last_message();
+  fmi2FMUstate saved = nullptr;
+  ASSERT_EQ(fmi2GetFMUstate(c, &saved), fmi2OK);
+  const auto good = slave.all();
+  ASSERT_EQ(slave.step(1e-5, 1.0), fmi2Error);
+  for (const char* part : {"t = 1e-05", "h = 1", "failed"}) {
+    EXPECT_NE(slave.last_message().find(part), std::string::npos) << slave.last_message();
+  }
+  EXPECT_EQ(slave.step(1e-5, 1e-6), fmi2Error) << "no step from the error state";
+  EXPECT_EQ(slave.set("k1", 1.0), fmi2Error);
+  EXPECT_EQ(slave.get("time"), 1e-5);
+  EXPECT_EQ(slave.get("x[1,1]"), good[slave.reference("x[1,1]")]) << "the last success";
+  EXPECT_EQ(slave.output_derivative("x[1,1]"), slave.get("der(x[1,1])"));
+  fmi2Status last = fmi2OK;
+  ASSERT_EQ(fmi2GetStatus(c, fmi2DoStepStatus, &last), fmi2OK);
+  EXPECT_EQ(last, fmi2Error);
+  double time = 0.0;
+  ASSERT_EQ(fmi2GetRealStatus(c, fmi2LastSuccessfulTime, &time), fmi2OK);
+  EXPECT_EQ(time, 1e-5);
+  fmi2Boolean terminated = fmi2True;
+  ASSERT_EQ(fmi2GetBooleanStatus(c, fmi2Terminated, &terminated), fmi2OK);
+  EXPECT_EQ(terminated, fmi2False);
+  fmi2FMUstate none = nullptr;
+  EXPECT_EQ(fmi2GetFMUstate(c, &none), fmi2Error);
+
+  ASSERT_EQ(fmi2SetFMUstate(c, saved), fmi2OK) << slave.last_message();
+  EXPECT_TRUE(same_values(slave, slave.all(), good));
+  EXPECT_EQ(slave.step(1e-5, 1e-5), fmi2OK);
+
+  ASSERT_EQ(slave.step(2e-5, 1.0), fmi2Error);
+  ASSERT_EQ(fmi2Terminate(c), fmi2OK);
+  EXPECT_EQ(fmi2GetFMUstate(c, &none), fmi2Error) << "there is nothing whole to save";
+  ASSERT_EQ(fmi2Reset(c), fmi2OK);
+  slave.initialize();
+  ASSERT_EQ(slave.step(0.0, 1e-5), fmi2OK);
+  EXPECT_TRUE(same_values(slave, slave.all(), good));
+  EXPECT_EQ(fmi2FreeFMUstate(c, &saved), fmi2OK);
+}
+
+TEST(Behaviour21Instances, InterleavedOnesAreIndependent) {
+  Slave alone_a;
+  Slave alone_b(five_vehicles());
+  const auto expected_a = course(alone_a);
+  const auto expected_b = course(alone_b);
+  Slave a;
+  Slave b(five_vehicles());
+  a.initialize();
+  b.initialize();
+  for (int k = 0; k < 40; ++k) {
+    const double h = 2.0 / 40;
+    ASSERT_EQ(a.step(0.0 + k * h, h), fmi2OK);
+    ASSERT_EQ(b.step(0.0 + k * h, h), fmi2OK);
+  }
+  EXPECT_TRUE(same_values(a, a.all(), expected_a));
+  EXPECT_TRUE(same_values(b, b.all(), expected_b));
+}
+
+TEST(Behaviour21Instances, InThreadsAreIndependent) {
+  Slave alone;
+  const auto expected = course(alone);
+  constexpr int count = 4;
+  std::vector<std::vector<double>> seen(count);
+  resources_of(small_game());  // made before the threads, which only read it
+  std::vector<std::thread> threads;
+  for (int k = 0; k < count; ++k) {
+    threads.emplace_back([&, k] {
+      Slave slave;
+      seen[static_cast<std::size_t>(k)] = course(slave);
+    });
+  }
+  for (auto& thread : threads) thread.join();
+  for (const auto& values : seen) EXPECT_TRUE(same_values(alone, values, expected));
+}
+
+TEST(Behaviour22Symbols, ExactlyTheStandardsFunctionsAreExported) {
+  if (MIXED_ORDER_GAME_SANITIZED) GTEST_SKIP() << "sanitizers export their own";
+  std::set<std::string> expected;
+  for (const char* name : {"GetTypesPlatform",
+                           "GetVersion",
+                           "SetDebugLogging",
+                           "Instantiate",
+                           "FreeInstance",
+                           "SetupExperiment",
+                           "EnterInitializationMode",
+                           "ExitInitializationMode",
+                           "Terminate",
+                           "Reset",
+                           "GetReal",
+                           "GetInteger",
+                           "GetBoolean",
+                           "GetString",
+                           "SetReal",
+                           "SetInteger",
+                           "SetBoolean",
+                           "SetString",
+                           "GetFMUstate",
+                           "SetFMUstate",
+                           "FreeFMUstate",
+                           "SerializedFMUstateSize",
+                           "SerializeFMUstate",
+                           "DeSerializeFMUstate",
+                           "GetDirectionalDerivative",
+                           "EnterEventMode",
+                           "NewDiscreteStates",
+                           "EnterContinuousTimeMode",
+                           "CompletedIntegratorStep",
+                           "SetTime",
+                           "SetContinuousStates",
+                           "GetDerivatives",
+                           "GetEventIndicators",
+                           "GetContinuousStates",
+                           "GetNominalsOfContinuousStates",
+                           "SetRealInputDerivatives",
+                           "GetRealOutputDerivatives",
+                           "DoStep",
+                           "CancelStep",
+                           "GetStatus",
+                           "GetRealStatus",
+                           "GetIntegerStatus",
+                           "GetBooleanStatus",
+                           "GetStringStatus"}) {
+    expected.insert("fmi2" + std::string(name));
+  }
+  std::set<std::string> exported;
+  std::istringstream lines(output_of("nm -D --defined-only '" MIXED_ORDER_GAME_LIBRARY "'"));
+  for (std::string address, kind, name; lines >> address >> kind >> name;) exported.insert(name);
+  EXPECT_EQ(exported, expected);
+}
+
+TEST(Behaviour22Symbols, WorksBesideAForeignSundialsAndWithGlobalSymbols) {
+  if (MIXED_ORDER_GAME_SANITIZED) GTEST_SKIP() << "loads a second copy of what is linked in";
+  for (const char* foreign : {"libsundials_generic.so", "libsundials_nvecserial.so", "libsundials_cvode.so"}) {
+    dlopen(foreign, RTLD_NOW | RTLD_GLOBAL);  // where there is none, nothing can clash
+  }
+  void* const library = dlopen(MIXED_ORDER_GAME_LIBRARY, RTLD_NOW | RTLD_GLOBAL);
+  ASSERT_NE(library, nullptr) << dlerror();
+  const auto function = [&]<typename Function>(Function*, const char* name) {
+    return reinterpret_cast<Function*>(dlsym(library, name));
+  };
+  const auto instantiate = function(&fmi2Instantiate, "fmi2Instantiate");
+  const auto enter = function(&fmi2EnterInitializationMode, "fmi2EnterInitializationMode");
+  const auto leave = function(&fmi2ExitInitializationMode, "fmi2ExitInitializationMode");
+  const auto do_step = function(&fmi2DoStep, "fmi2DoStep");
+  const auto get_real = function(&fmi2GetReal, "fmi2GetReal");
+  const auto free_instance = function(&fmi2FreeInstance, "fmi2FreeInstance");
+  ASSERT_NE(instantiate, &fmi2Instantiate) << "the loaded copy is meant";
+
+  Slave linked;
+  linked.initialize();
+  linked.run(0.0, 2.0, 4);
+  const std::string uri = "file://" + resources_of(small_game());
+  const fmi2Component c =
+      instantiate("loaded", fmi2CoSimulation, linked.model().guid.c_str(), uri.c_str(), nullptr, fmi2False, fmi2False);
+  ASSERT_NE(c, nullptr);
+  ASSERT_EQ(enter(c), fmi2OK);
+  ASSERT_EQ(leave(c), fmi2OK);
+  for (int k = 0; k < 4; ++k) ASSERT_EQ(do_step(c, 0.5 * k, 0.5, fmi2True), fmi2OK);
+  for (const char* name : {"x[1,1]", "v[2,2]", "u[3,1]", "nash_error"}) {
+    const fmi2ValueReference vr = linked.reference(name);
+    double value = 0.0;
+    ASSERT_EQ(get_real(c, &vr, 1, &value), fmi2OK);
+    EXPECT_EQ(value, linked.get(name)) << name;
+  }
+  free_instance(c);
+  dlclose(library);
+}
+
+TEST(Behaviour23Libraries, OnlyTheSystemsOwnAreNeeded) {
+  if (MIXED_ORDER_GAME_SANITIZED) GTEST_SKIP() << "sanitizers need their own";
+  const std::string needed = output_of("objdump -p '" MIXED_ORDER_GAME_LIBRARY "' | grep NEEDED");
+  ASSERT_FALSE(needed.empty());
+  std::istringstream lines(needed);
+  for (std::string word, library; lines >> word >> library;) {
+    EXPECT_TRUE(library.starts_with("libc.so") || library.starts_with("libm.so") || library.starts_with("ld-linux"))
+        << library;
+  }
+}
+
+TEST(Behaviour24Instantiate, SurvivesMissingArguments) {
+  Slave good;
+  const std::string& guid = good.model().guid;
+  const std::string uri = "file://" + resources_of(small_game());
+  fmi2CallbackFunctions empty{};
+  const auto attempt = [&](const char* name, const char* with_guid, const char* with_uri,
+                           const fmi2CallbackFunctions* callbacks) {
+    const fmi2Component c =
+        fmi2Instantiate(name, fmi2CoSimulation, with_guid, with_uri, callbacks, fmi2False, fmi2True);
+    if (c == nullptr) return false;
+    double value = 0.0;
+    const fmi2ValueReference unknown = 0xFFFFFFFF;
+    EXPECT_EQ(fmi2GetReal(c, &unknown, 1, &value), fmi2Error);  // tells nobody
+    EXPECT_EQ(fmi2EnterInitializationMode(c), fmi2OK);
+    EXPECT_EQ(fmi2ExitInitializationMode(c), fmi2OK);
+    EXPECT_EQ(fmi2DoStep(c, 0.0, 0.1, fmi2False), fmi2OK);
+    fmi2FreeInstance(c);
+    return true;
+  };
+  for (const char* name : {static_cast<const char*>(nullptr), "", "name"}) {
+    for (const fmi2CallbackFunctions* callbacks :
+         {static_cast<const fmi2CallbackFunctions*>(nullptr), static_cast<const fmi2CallbackFunctions*>(&empty)}) {
+      EXPECT_TRUE(attempt(name, guid.c_str(), uri.c_str(), callbacks));
+      for (const char* bad_guid : {static_cast<const char*>(nullptr), "", "{00000000-0000-0000-0000-000000000000}"}) {
+        EXPECT_FALSE(attempt(name, bad_guid, uri.c_str(), callbacks));
+      }
+      for (const char* bad_uri : {static_cast<const char*>(nullptr), "", "file:", "file://", "file:///nowhere",
+                                  "http://localhost/x", "file://elsewhere/x", "file:///%00", "/", "file:///"}) {
+        EXPECT_FALSE(attempt(name, guid.c_str(), bad_uri, callbacks)) << (bad_uri == nullptr ? "null" : bad_uri);
+      }
+    }
+  }
+  EXPECT_EQ(fmi2Instantiate("name", fmi2ModelExchange, guid.c_str(), uri.c_str(), &empty, fmi2False, fmi2False),
+            nullptr);
+}
+
+TEST(Behaviour24Instantiate, TellsWhyNot) {
+  std::vector<LogEntry> told;
+  fmi2CallbackFunctions callbacks{};
+  callbacks.componentEnvironment = &told;
+  callbacks.logger = record;
+  const auto reason = [&](const std::string& game, const char* guid) {
+    told.clear();
+    EXPECT_EQ(fmi2Instantiate("name", fmi2CoSimulation, guid, ("file://" + resources_of(game)).c_str(), &callbacks,
+                              fmi2False, fmi2False),
+              nullptr);
+    EXPECT_EQ(told.size(), 1U);
+    if (told.empty()) return std::string();
+    EXPECT_EQ(told[0].status, fmi2Error);
+    EXPECT_EQ(told[0].category, "logStatusError");
+    return told[0].message;
+  };
+  EXPECT_NE(reason(small_game(), "{wrong}").find("GUID"), std::string::npos);
+  const std::string bad = reason(small_game_with({{"k1 = 6.0", "k1 = -6.0"}}), "{any}");
+  EXPECT_NE(bad.find("k1"), std::string::npos) << bad;
+  EXPECT_NE(bad.find("game.toml"), std::string::npos) << bad;
+  EXPECT_FALSE(reason("this is [not TOML", "{any}").empty());
+  EXPECT_FALSE(reason("", "{any}").empty());
+}
+
+TEST(Behaviour24ResourceLocation, IsDecoded) {
+  EXPECT_EQ(path_of("file:///a/b"), "/a/b");
+  EXPECT_EQ(path_of("file:/a/b"), "/a/b");
+  EXPECT_EQ(path_of("file://localhost/a/b"), "/a/b");
+  EXPECT_EQ(path_of("file:///a%20b/%C3%A9%25"), "/a b/\xC3\xA9%");
+  EXPECT_EQ(path_of("file:///a%2"), "/a%2");
+  EXPECT_EQ(path_of("file:///100%zz"), "/100%zz");
+  EXPECT_EQ(path_of("/a%20b"), "/a%20b") << "a plain path is taken as it is";
+  EXPECT_EQ(path_of("a b/c"), "a b/c");
+  for (const char* bad : {"", "http://x/y", "file:", "file://", "file://host", "file://host/x", "file:///%00x"}) {
+    EXPECT_THROW((void)path_of(bad), Error) << bad;
+  }
+}
+
+TEST(Behaviour24ResourceLocation, BlanksAndLettersBeyondAscii) {
+  const std::string folder = resources_of(small_game(), "r\xC3\xA9sum\xC3\xA9 of #1 100%");
+  Slave good;
+  std::string encoded;
+  for (const char character : folder) {
+    char code[8];
+    const auto byte = static_cast<unsigned char>(character);
+    if (byte > 0x7E || byte == ' ' || byte == '#' || byte == '%') {
+      std::snprintf(code, sizeof code, "%%%02x", byte);
+      encoded += code;
+    } else {
+      encoded += character;
+    }
+  }
+  for (const std::string& location :
+       {"file://" + encoded, "file:" + encoded, "file://localhost" + encoded, "file://" + encoded + "/", folder}) {
+    const fmi2Component c = fmi2Instantiate("name", fmi2CoSimulation, good.model().guid.c_str(), location.c_str(),
+                                            nullptr, fmi2False, fmi2False);
+    EXPECT_NE(c, nullptr) << location;
+    fmi2FreeInstance(c);
+  }
+}
+
+TEST(Behaviour25Messages, AreHarmlessAndHaveACategory) {
+  EXPECT_EQ(harmless("100%s of #r1#\n"), "100_s of _r1_ ");
+  Slave slave(small_game(), true);
+  slave.initialize();
+  slave.run(0.0, 0.2, 2);
+  EXPECT_EQ(slave.step(0.0, -1.0), fmi2Error);
+  EXPECT_EQ(slave.set("k1", -1.0), fmi2Error);
+  ASSERT_EQ(fmi2Terminate(slave.component), fmi2OK);
+  std::set<std::string> categories;
+  for (const LogEntry& entry : slave.log) {
+    EXPECT_EQ(entry.message.find_first_of("%#\n"), std::string::npos) << entry.message;
+    EXPECT_FALSE(entry.message.empty());
+    EXPECT_EQ(entry.instance, "slave");
+    EXPECT_EQ(entry.status == fmi2Error, entry.category == "logStatusError");
+    categories.insert(entry.category);
+  }
+  EXPECT_EQ(categories, (std::set<std::string>{"logStatusError", "logEvents"}));
+}
+
+TEST(Behaviour25Messages, LoggingOffGivesErrorsOnly) {
+  Slave slave(small_game(), false);
+  slave.initialize();
+  slave.run(0.0, 0.2, 2);
+  EXPECT_TRUE(slave.log.empty());
+  EXPECT_EQ(slave.step(0.0, -1.0), fmi2Error);
+  EXPECT_EQ(slave.log.size(), 1U);
+  const char* events = "logEvents";
+  ASSERT_EQ(fmi2SetDebugLogging(slave.component, fmi2True, 1, &events), fmi2OK);
+  ASSERT_EQ(fmi2Terminate(slave.component), fmi2OK);
+  EXPECT_EQ(slave.log.size(), 2U);
+  ASSERT_EQ(fmi2SetDebugLogging(slave.component, fmi2False, 0, nullptr), fmi2OK);
+  ASSERT_EQ(fmi2Reset(slave.component), fmi2OK);
+  slave.initialize();
+  EXPECT_EQ(slave.log.size(), 2U);
+}
+
+TEST(Behaviour25Surroundings, AreUntouchedAndWithoutInfluence) {
+  Slave plain;
+  const auto expected = course(plain);
+  Slave slave;
+  Slave exploding(exploding_game());
+  const std::string& guid = slave.model().guid;
+  const std::string uri = "file://" + resources_of(small_game());
+  const std::string folder = std::filesystem::current_path();
+
+  testing::internal::CaptureStdout();
+  testing::internal::CaptureStderr();
+  ASSERT_EQ(std::fesetround(FE_UPWARD), 0);
+  feclearexcept(FE_ALL_EXCEPT);
+  feenableexcept(FE_DIVBYZERO | FE_INVALID | FE_OVERFLOW);
+  const fmi2Component other =
+      fmi2Instantiate("other", fmi2CoSimulation, guid.c_str(), uri.c_str(), nullptr, fmi2False, fmi2False);
+  exploding.initialize();
+  const fmi2Status failed = exploding.step(0.0, 1.0);
+  slave.initialize();
+  fmi2Status fine = fmi2OK;
+  double t = 0.0;  // h is exact, so that the host's rounding does not move the communication points
+  for (const double h = 0.03125; t < 2.0; t += h) fine = std::max(fine, slave.step(t, h));
+  std::vector<double> seen(1);
+  const fmi2ValueReference x = slave.reference("x[1,1]");
+  fine = std::max(fine, fmi2GetReal(slave.component, &x, 1, seen.data()));
+  const int rounding = std::fegetround();
+  const int traps = fegetexcept();
+  const int raised = std::fetestexcept(FE_ALL_EXCEPT & ~FE_INEXACT);
+  fedisableexcept(FE_ALL_EXCEPT);
+  std::fesetround(FE_TONEAREST);
+  EXPECT_EQ(testing::internal::GetCapturedStdout(), "");
+  EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
+
+  EXPECT_NE(other, nullptr) << "the GUID does not depend on the host's rounding";
+  fmi2FreeInstance(other);
+  EXPECT_EQ(failed, fmi2Error);
+  EXPECT_EQ(fine, fmi2OK);
+  EXPECT_EQ(rounding, FE_UPWARD);
+  EXPECT_EQ(traps, FE_DIVBYZERO | FE_INVALID | FE_OVERFLOW);
+  EXPECT_EQ(raised, 0);
+  EXPECT_EQ(seen[0], expected[x]) << "the host's rounding and traps do not reach the calculation";
+  EXPECT_EQ(std::filesystem::current_path(), folder);
+  EXPECT_STREQ(std::setlocale(LC_ALL, nullptr), "C");
+}
