@@ -1,0 +1,128 @@
+"""Makes an FMU from a game file: the host tool writes modelDescription.xml, packaging makes the archive.
+
+Every game shares one compiled binary; no compiler is needed. The package carries, in its folder `_native`,
+mixed-order-game-description (the host tool), binaries/<platform>/, documentation/, licenses/ and model.png;
+in its folder `games` the game files.
+"""
+
+import hashlib
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+from .errors import BuildError, GameError
+from .packaging import PackagingError, write_fmu
+
+DEFAULT_GAME = "five_vehicles"
+"""The paper's example."""
+
+TOOL = "mixed-order-game-description"
+
+
+def build_fmu(game: Path | str, output: Path | str) -> Path:
+    """Make the FMU of a game file (TOML) and return the path written, `output`.
+
+    Equal inputs give equal bytes. Raises GameError if the file is missing or breaks the definition of a game,
+    BuildError if the installation lacks the compiled parts or the archive cannot be written.
+    """
+    game, output = Path(game), Path(output)
+    if not game.is_file():
+        raise GameError(f"there is no game file {game}")
+    native = native_directory()
+    with tempfile.TemporaryDirectory(prefix="mixed-order-game-") as folder:
+        description = Path(folder) / "modelDescription.xml"
+        _describe(native, game, description)
+        try:
+            return write_fmu(
+                output,
+                model_description=description,
+                game=game,
+                binaries=_binaries(native),
+                documentation=native / "documentation",
+                licenses={path.name: path for path in sorted((native / "licenses").iterdir())},
+                icon=native / "model.png",
+            )
+        except (PackagingError, OSError) as error:
+            raise BuildError(f"cannot write {output}: {error}") from error
+
+
+def default_fmu() -> Path:
+    """The FMU of the paper's example, made once and kept in the user's cache folder.
+
+    Raises as build_fmu does.
+    """
+    return cached_fmu(default_game())
+
+
+def cached_fmu(game: Path | str) -> Path:
+    """The FMU of a game file, made on first use and kept in the user's cache folder.
+
+    The entry's name holds a fingerprint of the game, the compiled parts and the documentation, so that a
+    changed file gives a new FMU. Raises as build_fmu does.
+    """
+    import platformdirs
+
+    game = Path(game)
+    if not game.is_file():
+        raise GameError(f"there is no game file {game}")
+    fingerprint = hashlib.sha256(game.read_bytes())
+    native = native_directory()
+    for path in sorted(path for path in native.rglob("*") if path.is_file()):
+        fingerprint.update(path.relative_to(native).as_posix().encode() + b"\0" + path.read_bytes())
+    cache = platformdirs.user_cache_path("mixed-order-game")
+    output = cache / fingerprint.hexdigest()[:16] / "MixedOrderGame.fmu"
+    return output if output.is_file() else build_fmu(game, output)
+
+
+def default_game() -> Path:
+    """Game file of the paper's example. Raises BuildError if the installation lacks it."""
+    return shipped_game(DEFAULT_GAME)
+
+
+def shipped_game(name: str) -> Path:
+    """Game file that comes with the package, by name without suffix. Raises BuildError if there is none."""
+    for folder in _package_folders():
+        path = folder / "games" / f"{name}.toml"
+        if path.is_file():
+            return path
+    raise BuildError(
+        f"this installation carries no game {name}: install the package mixed-order-game with pip"
+    )
+
+
+def native_directory() -> Path:
+    """Folder of the compiled parts. Raises BuildError if this installation has none."""
+    for folder in _package_folders():
+        if (folder / "_native").is_dir():
+            return folder / "_native"
+    raise BuildError(
+        "this installation carries no compiled FMU: install the package mixed-order-game with pip"
+    )
+
+
+def _package_folders() -> Iterator[Path]:
+    """Folders of the package; an editable installation has two, the sources and the compiled parts."""
+    yield from map(Path, sys.modules[__package__].__path__)
+
+
+def _binaries(native: Path) -> dict[str, Path]:
+    found = {path.parent.name: path for path in sorted(native.glob("binaries/*/MixedOrderGame.*"))}
+    if not found:
+        raise BuildError(f"there is no binary below {native / 'binaries'}")
+    return found
+
+
+def _describe(native: Path, game: Path, output: Path) -> None:
+    """Run the host tool. It exits with 1 and one sentence on stderr for a bad game."""
+    tool = native / (TOOL + (".exe" if sys.platform == "win32" else ""))
+    command = [str(tool), str(game), "--output", str(output)]
+    try:
+        finished = subprocess.run(command, capture_output=True, text=True, errors="replace", check=False)
+    except OSError as error:
+        raise BuildError(f"cannot run {tool}: {error}") from error
+    if finished.returncode == 1:
+        raise GameError(" ".join(finished.stderr.split()))
+    if finished.returncode != 0 or not output.is_file():
+        raise BuildError(f"{tool.name} ended with status {finished.returncode}: {finished.stderr.strip()}")

@@ -1,0 +1,348 @@
+"""The command mog: parses options and prints; everything else is done by the library.
+
+Exit codes: 0 fine; 1 a check failed, or an error told in one sentence on stderr; 2 wrong usage.
+"""
+
+import json
+import math
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+import typer.core
+
+from .errors import GameError, MixedOrderGameError
+from .version import package_version
+
+if TYPE_CHECKING:
+    from .validate import Validation
+
+
+class ErrorsAsSentences(typer.core.TyperGroup):
+    """Prints the package's own exceptions as one sentence on stderr and exits with 1."""
+
+    def invoke(self, ctx: Any) -> Any:
+        """Run a command."""
+        try:
+            return super().invoke(ctx)
+        except MixedOrderGameError as error:
+            typer.echo(f"mog: {error}", err=True)
+            raise typer.Exit(1) from error
+
+
+app = typer.Typer(
+    name="mog",
+    cls=ErrorsAsSentences,
+    help="Distributed Nash equilibrium seeking for mixed-order games, as an FMU.",
+    no_args_is_help=True,
+    rich_markup_mode="rich",
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+GAME_HELP = "An FMU (.fmu) or a game file (.toml); the paper's example when left out."
+Game = Annotated[Path | None, typer.Argument(help=GAME_HELP, show_default=False)]
+
+
+class FigureFormat(StrEnum):
+    """File formats of figures."""
+
+    PDF = "pdf"
+    SVG = "svg"
+    PNG = "png"
+
+
+class FigureWidth(StrEnum):
+    """Widths of figures in a two-column paper."""
+
+    COLUMN = "column"
+    PAGE = "page"
+
+
+def _version(value: bool) -> None:
+    if value:
+        typer.echo(f"mog {package_version()}")
+        raise typer.Exit
+
+
+@app.callback()
+def root(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version and exit.")
+    ] = False,
+) -> None:
+    """Distributed Nash equilibrium seeking for mixed-order games, as an FMU.
+
+    Every command takes an FMU or a game file, and the paper's example when given neither.
+    """
+
+
+@app.command()
+def build(
+    game: Annotated[
+        Path | None,
+        typer.Argument(help="A game file (.toml); the paper's example when left out.", show_default=False),
+    ] = None,
+    output: Annotated[Path, typer.Option("--output", "-o", help="The FMU to write.")] = Path(
+        "MixedOrderGame.fmu"
+    ),
+) -> None:
+    """Make an FMU from a game file. No compiler is needed.
+
+    [bold]Example:[/bold] mog build my_game.toml --output my_game.fmu
+    """
+    from .build import build_fmu, default_game
+
+    typer.echo(build_fmu(default_game() if game is None else game, output))
+
+
+@app.command()
+def info(
+    game: Game = None,
+    variables: Annotated[bool, typer.Option("--variables", help="List every variable.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+) -> None:
+    """Show a game: sizes, graph, gains and who chose them, variables, capabilities.
+
+    [bold]Example:[/bold] mog info MixedOrderGame.fmu --variables
+    """
+    from .model import read_model
+    from .tables import info_data, print_info
+
+    model = read_model(_fmu(game))
+    if as_json:
+        typer.echo(json.dumps(info_data(model, variables=variables), indent=2))
+    else:
+        print_info(model, variables=variables)
+
+
+@app.command()
+def run(
+    game: Game = None,
+    settings: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="NAME=VALUE", help="Start value of a parameter or input; repeatable."),
+    ] = None,
+    stop_time: Annotated[
+        float | None, typer.Option(help="End of the run in s.", show_default="FMU's")
+    ] = None,
+    start_time: Annotated[float, typer.Option(help="Beginning of the run in s.")] = 0.0,
+    step: Annotated[
+        float | None, typer.Option(help="Time between samples in s.", show_default="FMU's")
+    ] = None,
+    tolerance: Annotated[
+        float | None, typer.Option(help="Relative tolerance of the integrator.", show_default="FMU's")
+    ] = None,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="Result file, .csv or .parquet.", show_default=False)
+    ] = None,
+    variables: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAMES",
+            help="Variables to record, separated by commas; x stands for every x\\[i,l]; repeatable. "
+            "All but y and W when left out.",
+        ),
+    ] = None,
+) -> None:
+    r"""Run a game through fmpy and write or summarize the result.
+
+    [bold]Examples:[/bold]
+
+    mog run --set k1=12 --set "a\[1,3]=0.5" --output result.parquet
+
+    mog run my_game.toml --stop-time 5 --variables x,v,nash_error --output result.csv
+    """
+    from .names import split_names
+    from .run import Simulator
+    from .tables import print_result
+
+    values = dict(_setting(text) for text in settings or [])
+    if len(values) != len(settings or []):
+        raise typer.BadParameter("a variable is set twice", param_hint="--set")
+    if output is not None and output.suffix not in (".csv", ".parquet"):
+        raise typer.BadParameter("the file must end in .csv or .parquet", param_hint="--output")
+    with Simulator(_fmu(game)) as simulator, _progress() as show:
+        model = simulator.model
+        stop = model.stop_time if stop_time is None else stop_time
+        span = stop - start_time
+        result = simulator.run(
+            start_values=values,
+            start_time=start_time,
+            stop_time=stop,
+            step=model.step if step is None else step,
+            tolerance=model.tolerance if tolerance is None else tolerance,
+            outputs=None if not variables else [name for text in variables for name in split_names(text)],
+            progress=lambda time: show("simulating", (time - start_time) / span),
+        )
+    if output is not None:
+        typer.echo(result.save(output))
+    else:
+        print_result(result)
+
+
+@app.command()
+def validate(
+    game: Game = None,
+    neighbourhood: Annotated[
+        float | None,
+        typer.Option(min=0.0, help="Largest |x - x*| of Theorem 1.", show_default="from the game"),
+    ] = None,
+    settle_time: Annotated[
+        float | None,
+        typer.Option(
+            min=0.0, help="Time in s from which Theorem 1 is judged.", show_default="80 % of the run"
+        ),
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+) -> None:
+    """Judge the paper's claims on a game; exit with 1 if one fails.
+
+    [bold]Example:[/bold] mog validate my_game.toml --neighbourhood 0.01 --settle-time 10
+    """
+    from .validate import validate as judge
+
+    fmu = _fmu(game)
+    with _progress() as show:
+        verdict = judge(fmu, neighbourhood=neighbourhood, settle_time=settle_time, progress=show)
+    _report(verdict, as_json=as_json)
+
+
+@app.command()
+def plot(
+    source: Annotated[
+        Path | None,
+        typer.Argument(
+            help="A result (.parquet, .csv), an FMU or a game file; the paper's example when left out.",
+            show_default=False,
+        ),
+    ] = None,
+    output: Annotated[Path, typer.Option("--output", "-o", help="Folder for the figures.")] = Path("figures"),
+    file_format: Annotated[FigureFormat, typer.Option("--format", help="File format.")] = FigureFormat.PDF,
+    width: Annotated[FigureWidth, typer.Option(help="Width in a two-column paper.")] = FigureWidth.COLUMN,
+) -> None:
+    """Draw the figures of a result, or of a game the paper's four, the error and the paths in the plane.
+
+    [bold]Examples:[/bold]
+
+    mog plot --output figures --format svg
+
+    mog plot result.parquet --width page
+    """
+    from .plot import COLUMN_WIDTH, PAGE_WIDTH, paper_figures, result_figures, save_figure
+    from .results import load
+    from .run import Simulator
+
+    inches = PAGE_WIDTH if width is FigureWidth.PAGE else COLUMN_WIDTH
+    if source is not None and source.suffix in (".csv", ".parquet"):
+        figures = result_figures(load(source), width=inches)
+    else:
+        with Simulator(_fmu(source)) as simulator:
+            robust, plain = (
+                simulator.run(
+                    start_values={"robust": on, "perturbed": on}, stop_time=simulator.model.stop_time
+                )
+                for on in (True, False)
+            )
+        figures = paper_figures(robust, plain, width=inches)
+    for name, axes in figures.items():
+        typer.echo(save_figure(axes, output / f"{name}.{file_format.value}"))
+
+
+@app.command()
+def demo(
+    output: Annotated[Path, typer.Option("--output", "-o", help="Folder for results and figures.")] = Path(
+        "demo"
+    ),
+    fmu: Annotated[
+        Path | None,
+        typer.Option(
+            help="The FMU (or game file) to use; the paper's example when left out.", show_default=False
+        ),
+    ] = None,
+    file_format: Annotated[FigureFormat, typer.Option("--format", help="File format.")] = FigureFormat.PNG,
+) -> None:
+    """Simulate the paper's example, judge each claim, print the verdict and write results and figures.
+
+    [bold]Example:[/bold] mog demo --output demo
+    """
+    from .demo import demo as demonstrate
+
+    path = _fmu(fmu)
+    with _progress() as show:
+        done = demonstrate(path, output, suffix=f".{file_format.value}", progress=show)
+    for file in done.files:
+        typer.echo(file)
+    _report(done.validation, as_json=False)
+
+
+def main() -> None:
+    """Entry point of the command."""
+    app()
+
+
+def _fmu(game: Path | None) -> Path:
+    """The FMU meant by an argument; a game file is made into one, kept in the user's cache."""
+    from .build import cached_fmu, default_fmu
+
+    if game is None:
+        return default_fmu()
+    if game.suffix == ".fmu":
+        return game
+    if game.suffix == ".toml":
+        return cached_fmu(game)
+    raise GameError(f"{game} is neither an FMU (.fmu) nor a game file (.toml)")
+
+
+def _setting(text: str) -> tuple[str, float | bool]:
+    name, separator, value = text.partition("=")
+    if not (name.strip() and separator):
+        raise typer.BadParameter(f"NAME=VALUE expected, not {text!r}", param_hint="--set")
+    booleans = {"true": True, "false": False}
+    if value.strip().lower() in booleans:
+        return name.strip(), booleans[value.strip().lower()]
+    try:
+        return name.strip(), float(value)
+    except ValueError:
+        raise typer.BadParameter(
+            f"the value of {name.strip()} must be a number, true or false, not {value!r}", param_hint="--set"
+        ) from None
+
+
+def _report(verdict: "Validation", *, as_json: bool) -> None:
+    from .tables import print_validation
+
+    if as_json:
+        typer.echo(json.dumps(verdict.as_json(), indent=2))
+    else:
+        print_validation(verdict)
+    if not verdict.passed:
+        failed = [claim.name for claim in verdict.claims if not claim.passed]
+        typer.echo(f"mog: {', '.join(failed)} failed", err=True)
+        raise typer.Exit(1)
+
+
+@contextmanager
+def _progress() -> Iterator[Callable[[str, float], None]]:
+    """Progress bars on stderr, one for each name; none when stderr is not a terminal."""
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
+
+    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
+    console = Console(stderr=True)
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bars:
+        tasks: dict[str, TaskID] = {}
+
+        def show(name: str, part: float) -> None:
+            if name not in tasks:
+                tasks[name] = bars.add_task(name, total=1.0)
+            bars.update(tasks[name], completed=part if math.isfinite(part) else 0.0)
+
+        yield show
+
+
+if __name__ == "__main__":
+    main()

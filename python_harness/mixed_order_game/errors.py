@@ -1,0 +1,36 @@
+"""Exceptions of the package: everything it raises on purpose derives from MixedOrderGameError.
+
+The command prints the text of these as one sentence on stderr and exits with status 1.
+"""
+
+
+class MixedOrderGameError(Exception):
+    """Base of every error the package raises on purpose."""
+
+
+class GameError(MixedOrderGameError):
+    """A game definition file that is missing or breaks the definition."""
+
+
+class BuildError(MixedOrderGameError):
+    """An FMU that could not be made from a game, for another reason than the game itself."""
+
+
+class ModelError(MixedOrderGameError):
+    """An FMU that cannot be read or is not of this project."""
+
+
+class VariableError(MixedOrderGameError):
+    """A variable that does not exist, cannot be set, or a value that it does not take."""
+
+
+class SimulationError(MixedOrderGameError):
+    """A run that cannot be started or that the FMU refused; the text ends with the FMU's own message."""
+
+
+class ResultError(MixedOrderGameError):
+    """A result file that cannot be read or written, or a signal that was not recorded."""
+
+
+class PlotError(MixedOrderGameError):
+    """A figure that cannot be drawn from the result given."""

@@ -1,0 +1,140 @@
+"""What the command prints: tables of a model, a result and a verdict, on stdout."""
+
+from collections import Counter
+from collections.abc import Sequence
+from itertools import groupby
+from typing import Any
+
+import numpy as np
+from rich.box import SIMPLE_HEAD as LINES
+from rich.console import Console
+from rich.table import Column, Table
+from rich.text import Text
+
+from .errors import ResultError
+from .model import Model, provenance
+from .results import Result
+from .validate import Validation
+
+LONGEST_LIST = 20
+
+
+def print_info(model: Model, *, variables: bool = False) -> None:
+    """Print what an FMU says about itself."""
+    console = Console(highlight=False)
+    data = info_data(model, variables=variables)
+    grid = Table.grid(padding=(0, 2))
+    for key in ("title", "fmu", "guid", "generation_tool", "players", "dimension", "neurons"):
+        grid.add_row(key.replace("_", " "), Text(str(data[key])))
+    grid.add_row("orders", _orders(model.order))
+    edges = ", ".join(f"{i}-{j}" + (f" ({w:g})" if w != 1.0 else "") for i, j, w in model.edges)
+    grid.add_row("graph", Text(edges))
+    grid.add_row("gains", ", ".join(f"{name} = {value:g}" for name, value in model.gains.items()))
+    grid.add_row("experiment", f"{model.stop_time:g} s, step {model.step:g} s, tolerance {model.tolerance:g}")
+    counts = ", ".join(f"{count} {kind}" for kind, count in data["variable_counts"].items())
+    grid.add_row("variables", counts)
+    console.print(grid)
+
+    sources = provenance(model)
+    if sources:
+        table = Table("values", "variables", "source", box=LINES)
+        for source in sources:
+            table.add_row(source.group, ", ".join(source.names), source.source)
+        console.print(table)
+
+    kinds = list(model.capabilities)
+    table = Table("capability", *kinds, box=LINES)
+    for name in dict.fromkeys(name for kind in kinds for name in model.capabilities[kind]):
+        table.add_row(name, *(_plain(model.capabilities[kind].get(name, "-")) for kind in kinds))
+    console.print(table)
+
+    if variables:
+        table = Table("variable", "causality", "variability", "start", "range", "unit", "meaning", box=LINES)
+        for entry in model.variables.values():
+            start = "" if entry.start is None else _plain(entry.start)
+            bounds = (entry.minimum, entry.maximum)
+            limits = (
+                "" if bounds == (None, None) else " to ".join("" if b is None else f"{b:g}" for b in bounds)
+            )
+            cells = (entry.name, entry.causality, entry.variability, start, limits, entry.unit or "")
+            table.add_row(*map(Text, cells), Text(entry.description))
+        console.print(table)
+
+
+def info_data(model: Model, *, variables: bool = False) -> dict[str, Any]:
+    """The same as plain values for json.dumps."""
+    data: dict[str, Any] = {
+        "title": model.title,
+        "fmu": str(model.path),
+        "guid": model.guid,
+        "generation_tool": model.generation_tool,
+        "fmi_version": model.fmi_version,
+        "players": model.players,
+        "dimension": model.dimension,
+        "neurons": model.neurons,
+        "order": list(model.order),
+        "player_names": list(model.player_names),
+        "edges": [list(edge) for edge in model.edges],
+        "gains": model.gains,
+        "stop_time": model.stop_time,
+        "step": model.step,
+        "tolerance": model.tolerance,
+        "paper_example": model.is_paper_example,
+        "sources": [
+            {"group": source.group, "variables": list(source.names), "source": source.source}
+            for source in provenance(model)
+        ],
+        "variable_counts": dict(Counter(variable.causality for variable in model.variables.values())),
+        "capabilities": {kind: dict(flags) for kind, flags in model.capabilities.items()},
+    }
+    if variables:
+        data["variables"] = [vars(variable) for variable in model.variables.values()]
+    return data
+
+
+def print_result(result: Result) -> None:
+    """Print where a run ended: each player's action, velocity and distance to the equilibrium."""
+    console = Console(highlight=False)
+    console.print(Text(repr(result)))
+    try:
+        x, v, x_star = result.x[-1], result.v[-1], result.x_star
+    except ResultError:
+        return  # the run recorded other variables; the line above names their number
+    table = Table("player", "x", "v", "x*", "|x - x*|", box=LINES)
+    for i in range(result.players):
+        velocity = "" if np.isnan(v[i]).all() else _numbers(v[i])
+        distance = float(np.linalg.norm(x[i] - x_star[i]))
+        table.add_row(str(i + 1), _numbers(x[i]), velocity, _numbers(x_star[i]), f"{distance:.2e}")
+    console.print(table)
+
+
+def print_validation(verdict: Validation) -> None:
+    """Print every claim with its figure, its bound and whether it holds."""
+    console = Console(highlight=False)
+    console.print(Text(verdict.model.title, style="bold"))
+    table = Table("", "claim", Column("figure", no_wrap=True), Column("bound", no_wrap=True), box=LINES)
+    for claim in verdict.claims:
+        mark = Text("holds", style="green") if claim.passed else Text("fails", style="bold red")
+        unit = "" if claim.unit == "1" else f" {claim.unit}"
+        bound = f"{claim.relation} {claim.bound:.4g}{unit}"
+        table.add_row(mark, Text(claim.statement), f"{claim.figure:.4g}", bound)
+    console.print(table)
+    for note in verdict.notes:
+        console.print(Text(note))
+
+
+def _orders(order: Sequence[int]) -> str:
+    """Orders as 1,1,2; many of them as 30 x 1, 30 x 2."""
+    if len(order) <= LONGEST_LIST:
+        return ",".join(map(str, order))
+    return ", ".join(f"{len(list(run))} x {value}" for value, run in groupby(order))
+
+
+def _numbers(values: Any) -> str:
+    return ", ".join(f"{value:.5g}" for value in values)
+
+
+def _plain(value: object) -> str:
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return f"{value:g}" if isinstance(value, float) else str(value)

@@ -1,0 +1,32 @@
+"""Fixtures of the Python package's tests: FMUs of the paper's example and of the test games."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from mixed_order_game import build_fmu, default_game
+
+GAMES = Path(__file__).parent / "reference" / "games"
+
+FmuOf = Callable[[str], Path]
+
+
+@pytest.fixture(scope="session")
+def fmu(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The FMU of the paper's example."""
+    return build_fmu(default_game(), tmp_path_factory.mktemp("fmu") / "MixedOrderGame.fmu")
+
+
+@pytest.fixture(scope="session")
+def fmu_of(fmu: Path, tmp_path_factory: pytest.TempPathFactory) -> FmuOf:
+    """The FMU of a game in tests/reference/games by name, or of the paper's example, built once."""
+    built = {"five_vehicles": fmu}
+    folder = tmp_path_factory.mktemp("fmus")
+
+    def build(name: str) -> Path:
+        if name not in built:
+            built[name] = build_fmu(GAMES / f"{name}.toml", folder / f"{name}.fmu")
+        return built[name]
+
+    return build

@@ -1,0 +1,224 @@
+"""The command: exit codes, sentences on stderr, files and JSON."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner, Result
+
+from mixed_order_game import default_game, load, package_version
+from mixed_order_game.cli import app
+
+COMMANDS = ["build", "info", "run", "validate", "plot", "demo"]
+
+
+def mog(*arguments: object) -> Result:
+    return CliRunner(env={"COLUMNS": "200", "NO_COLOR": "1"}).invoke(app, [str(each) for each in arguments])
+
+
+def sentence(result: Result) -> str:
+    """The one sentence on stderr of a command that ended with 1."""
+    assert result.exit_code == 1, result.output
+    assert result.stderr.startswith("mog: ")
+    assert result.stderr.count("\n") == 1
+    return result.stderr
+
+
+def test_version_and_help() -> None:
+    assert mog("--version").stdout == f"mog {package_version()}\n"
+    assert mog().exit_code == 2
+    top = mog("--help")
+    assert top.exit_code == 0
+    for command in COMMANDS:
+        assert command in top.stdout
+        told = mog(command, "--help")
+        assert told.exit_code == 0
+        assert f"mog {command}" in told.stdout.split("Example")[1]
+
+
+def test_installed_command(fmu: Path) -> None:
+    command = [sys.executable, "-m", "mixed_order_game", "run", str(fmu), "--stop-time", "0.1"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "6 samples" in done.stdout
+    bad = subprocess.run([*command, "--set", "k1=-1"], capture_output=True, text=True, check=False)
+    assert bad.returncode == 1
+    assert bad.stderr.startswith("mog: k1 = -1 ")
+    assert bad.stderr.count("\n") == 1
+    wrong = subprocess.run([*command, "--nonsense"], capture_output=True, text=True, check=False)
+    assert wrong.returncode == 2
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["nonsense"],
+        ["run", "--nonsense"],
+        ["run", "--set", "k1"],
+        ["run", "--set", "=1"],
+        ["run", "--set", "k1=ten"],
+        ["run", "--set", "k1=1", "--set", "k1=2"],
+        ["run", "--stop-time", "soon"],
+        ["run", "--output", "result.xlsx"],
+        ["validate", "--neighbourhood", "-1"],
+        ["plot", "--format", "bmp"],
+        ["plot", "--width", "wide"],
+        ["build", "one.toml", "two.toml"],
+    ],
+)
+def test_wrong_usage_exits_with_2(arguments: list[str]) -> None:
+    result = mog(*arguments)
+    assert result.exit_code == 2
+    assert "Usage" in result.stderr
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (["--set", "k5=1"], "there is no variable k5"),
+        (["--set", "x[1,1]=1"], "x[1,1] cannot be set: it is a continuous output"),
+        (["--set", "k1=nan"], "k1 must be finite"),
+        (["--set", "k1=true"], "k1 is a number"),
+        (["--set", "robust=1"], "robust is true or false"),
+        (["--set", "a[1,2]=-1"], "outside its range"),
+        (["--set", "a[1,2]=0", "--set", "a[2,3]=0"], "connected"),
+        (["--stop-time", "0"], "stop_time"),
+        (["--step", "-1"], "step"),
+        (["--tolerance", "2"], "tolerance"),
+        (["--variables", "x,nothing"], "there is no variable nothing"),
+    ],
+)
+def test_errors_of_run(arguments: list[str], told: str, fmu: Path) -> None:
+    assert told in sentence(mog("run", fmu, *arguments))
+
+
+@pytest.mark.parametrize("command", ["info", "run", "validate", "plot"])
+def test_files_that_are_no_games(command: str, tmp_path: Path) -> None:
+    (tmp_path / "text.fmu").write_text("text")
+    (tmp_path / "bad.toml").write_text("title = 1")
+    assert "neither an FMU" in sentence(mog(command, tmp_path / "game.txt"))
+    assert "there is no FMU" in sentence(mog(command, tmp_path / "none.fmu"))
+    assert "cannot be read" in sentence(mog(command, tmp_path / "text.fmu"))
+    assert "there is no game file" in sentence(mog(command, tmp_path / "none.toml"))
+    sentence(mog(command, tmp_path / "bad.toml"))
+
+
+def test_build(fmu: Path, tmp_path: Path) -> None:
+    output = tmp_path / "built.fmu"
+    result = mog("build", default_game(), "--output", output)
+    assert (result.exit_code, result.stdout) == (0, f"{output}\n")
+    assert output.read_bytes() == fmu.read_bytes()
+    bad = tmp_path / "bad.toml"
+    bad.write_text(default_game().read_text().replace("k1 = 10.0", "k1 = 0.0"))
+    assert "k1" in sentence(mog("build", bad, "--output", tmp_path / "bad.fmu"))
+    assert not (tmp_path / "bad.fmu").exists()
+
+
+def test_info(fmu: Path) -> None:
+    text = mog("info", fmu).stdout
+    for part in (
+        "1,1,1,2,2",
+        "1-2, 1-5, 2-3, 3-4, 4-5",
+        "k1 = 10",
+        "ours",
+        "the paper's",
+        "canGetAndSetFMUstate",
+    ):
+        assert part in text
+    assert "x_star[1,1]" in mog("info", fmu, "--variables").stdout
+    data = json.loads(mog("info", fmu, "--json", "--variables").stdout)
+    assert (data["players"], data["dimension"], data["neurons"]) == (5, 2, 11)
+    assert data["paper_example"] is True
+    assert {entry["name"] for entry in data["variables"]} >= {"k1", "x[1,1]"}
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".parquet"])
+def test_run_writes_files(suffix: str, fmu: Path, tmp_path: Path) -> None:
+    output = tmp_path / f"run{suffix}"
+    options = ["--set", "a[1,3]=0.5", "--set", "perturbed=false", "--stop-time", 1, "--step", 0.1]
+    result = mog("run", fmu, *options, "--variables", "x[1,2],v", "--variables", "nash_error", "-o", output)
+    assert (result.exit_code, result.stdout) == (0, f"{output}\n")
+    loaded = load(output)
+    assert loaded.time.shape == (11,)
+    assert [name for name in loaded.columns if not name.startswith("x_star")] == [
+        "x[1,2]",
+        *(f"v[{i},{k}]" for i in (4, 5) for k in (1, 2)),
+        "nash_error",
+    ]
+    if suffix == ".parquet":
+        assert loaded.parameters["a[1,3]"] == 0.5
+        assert loaded.stop_time == 1.0
+
+
+def test_run_takes_a_game_or_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    for arguments in ([], [default_game()]):
+        result = mog("run", *arguments, "--stop-time", 0.1)
+        assert result.exit_code == 0
+        assert "Connectivity control of five vehicles" in result.stdout
+
+
+def test_validate(fmu: Path) -> None:
+    result = mog("validate", fmu)
+    assert result.exit_code == 0, result.output
+    assert result.stdout.count("holds") == 10
+    failed = mog("validate", fmu, "--neighbourhood", 1e-5, "--json")
+    assert failed.exit_code == 1
+    assert failed.stderr == "mog: theorem_1_actions failed\n"
+    data = json.loads(failed.stdout)
+    assert data["passed"] is False
+
+
+def test_plot_of_game_and_results(fmu: Path, tmp_path: Path) -> None:
+    result = mog("plot", fmu, "--output", tmp_path / "game", "--format", "svg")
+    assert result.exit_code == 0, result.output
+    assert {path.name for path in (tmp_path / "game").iterdir()} == {
+        "positions_robust.svg",
+        "velocities_robust.svg",
+        "positions_unperturbed.svg",
+        "velocities_unperturbed.svg",
+        "error.svg",
+        "plane.svg",
+    }
+    for suffix in ("csv", "parquet"):
+        run = tmp_path / f"run.{suffix}"
+        assert mog("run", fmu, "--stop-time", 2, "--output", run).exit_code == 0
+        drawn = mog("plot", run, "--output", tmp_path / suffix, "--format", "png", "--width", "page")
+        assert drawn.exit_code == 0, drawn.output
+        assert len(list((tmp_path / suffix).iterdir())) == 4
+    sentence(mog("plot", tmp_path / "none.csv"))
+
+
+def test_demo(fmu: Path, tmp_path: Path) -> None:
+    result = mog("demo", "--fmu", fmu, "--output", tmp_path / "demo")
+    assert result.exit_code == 0, result.output
+    names = {path.name for path in (tmp_path / "demo").iterdir()}
+    assert {"claims.json", "robust.parquet", "unperturbed.parquet", "positions_robust.png"} <= names
+    assert result.stdout.count("holds") == 10
+    assert json.loads((tmp_path / "demo" / "claims.json").read_text())["passed"] is True
+    (tmp_path / "file").write_text("")
+    sentence(mog("demo", "--fmu", fmu, "--output", tmp_path / "file"))
+
+
+def test_results_are_the_same_in_any_locale_and_folder(fmu: Path, tmp_path: Path) -> None:
+    outputs = []
+    for name, language in (("a", "C"), ("b", "de_DE.UTF-8")):
+        folder = tmp_path / name
+        folder.mkdir()
+        command = [
+            sys.executable,
+            "-m",
+            "mixed_order_game",
+            "run",
+            str(fmu),
+            "--stop-time",
+            "1",
+            "-o",
+            "r.csv",
+        ]
+        subprocess.run(command, cwd=folder, env={**os.environ, "LC_ALL": language}, check=True)
+        outputs.append((folder / "r.csv").read_bytes())
+    assert outputs[0] == outputs[1]

@@ -1,0 +1,107 @@
+"""What an FMU says about itself, and what is told when asked for what it has not."""
+
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mixed_order_game import ModelError, VariableError, read_model
+from mixed_order_game.model import check_value, provenance
+from tests.conftest import FmuOf
+
+
+def test_paper_example(fmu: Path) -> None:
+    model = read_model(fmu)
+    assert (model.players, model.dimension, model.neurons) == (5, 2, 11)
+    assert model.order == (1, 1, 1, 2, 2)
+    assert model.edges == ((1, 2, 1.0), (1, 5, 1.0), (2, 3, 1.0), (3, 4, 1.0), (4, 5, 1.0))
+    assert model.gains["k1"] == 10.0
+    assert model.gains["rho"] == pytest.approx(5.0 * np.sqrt(2.0))
+    assert (model.stop_time, model.step, model.tolerance) == (20.0, 0.02, 1e-6)
+    assert model.player_names[0] == "vehicle 1"
+    assert model.is_paper_example
+    assert len(model.guid) > 10
+
+
+def test_provenance_of_the_paper_example_only(fmu: Path, fmu_of: FmuOf) -> None:
+    sources = {name: entry.source for entry in provenance(read_model(fmu)) for name in entry.names}
+    for name in ("cost_quadratic", "rho", "W_max", "beta", "delta", "epsilon", "x0", "v0"):
+        assert sources[name] == "the paper's"
+    for name in ("k1", "k2", "k3", "k4", "a", "z0", "y0"):
+        assert sources[name].startswith("ours")
+    assert provenance(read_model(fmu_of("interleaved_orders"))) == ()
+    assert read_model(fmu_of("five_vehicles_plain")).is_paper_example
+
+
+def test_vector_centers_have_neurons_but_no_center_variables(fmu_of: FmuOf) -> None:
+    model = read_model(fmu_of("vector_centers"))
+    assert model.neurons == len(model.game["rbf"]["centers"])
+    assert not model.indexed("center")
+
+
+def test_select_expands_and_keeps_one_of_each(fmu: Path) -> None:
+    model = read_model(fmu)
+    names = [variable.name for variable in model.select(["x", "x[1,2]", "nash_error"])]
+    assert len(names) == 11
+    assert names[-1] == "nash_error"
+
+
+@pytest.mark.parametrize(
+    ("name", "hint"), [("K1", "k1"), ("x[6,1]", "x["), ("nasherror", "nash_error"), ("qqqqqqqq", "qqqqqqqq")]
+)
+def test_unknown_names_come_with_the_nearest(name: str, hint: str, fmu: Path) -> None:
+    model = read_model(fmu)
+    with pytest.raises(VariableError, match="there is no variable") as told:
+        model.select([name])
+    assert hint in str(told.value)
+    with pytest.raises(VariableError, match="there is no variable"):
+        model.variable(name)
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "told"),
+    [
+        ("x[1,1]", 1.0, "x[1,1] cannot be set: it is a continuous output"),
+        ("nash_error", 1.0, "cannot be set"),
+        ("order[1]", 2.0, "order[1] cannot be set: it is a constant local"),
+        ("k1", "ten", "k1 is a number, not 'ten'"),
+        ("k1", True, "k1 is a number, not True"),
+        ("k1", float("nan"), "k1 must be finite"),
+        ("k1", float("inf"), "k1 must be finite"),
+        ("a[1,2]", -1.0, "a[1,2] = -1 is outside its range [0, inf]"),
+        ("robust", 1.0, "robust is true or false, not 1.0"),
+    ],
+)
+def test_values_refused(name: str, value: object, told: str, fmu: Path) -> None:
+    variable = read_model(fmu).variable(name)
+    with pytest.raises(VariableError) as error:
+        check_value(variable, value)
+    assert told in str(error.value)
+
+
+def test_fixed_parameters_are_refused_during_a_run(fmu: Path) -> None:
+    model = read_model(fmu)
+    assert check_value(model.variable("x0[1,1]"), np.float64(3.0)) == 3.0
+    with pytest.raises(VariableError, match="cannot be set during a run: it is a fixed parameter"):
+        check_value(model.variable("x0[1,1]"), 3.0, during_run=True)
+    assert check_value(model.variable("k1"), 3, during_run=True) == 3.0
+    assert check_value(model.variable("d_ext[1,1]"), 3, during_run=True) == 3.0
+
+
+def test_files_that_are_no_fmu_of_ours(tmp_path: Path) -> None:
+    with pytest.raises(ModelError, match="there is no FMU"):
+        read_model(tmp_path / "missing.fmu")
+    text = tmp_path / "text.fmu"
+    text.write_text("not a zip file")
+    with pytest.raises(ModelError, match="cannot be read as an FMU"):
+        read_model(text)
+    with zipfile.ZipFile(tmp_path / "empty.fmu", "w") as archive:
+        archive.writestr("readme", "")
+    with pytest.raises(ModelError, match=r"not an FMU of this project.*game\.toml"):
+        read_model(tmp_path / "empty.fmu")
+    with zipfile.ZipFile(tmp_path / "game.fmu", "w") as archive:
+        archive.writestr("resources/game.toml", "title = 'x'")
+        archive.writestr("modelDescription.xml", "<nonsense/>")
+    with pytest.raises(ModelError):
+        read_model(tmp_path / "game.fmu")

@@ -1,0 +1,144 @@
+"""Figures: the curves expected with the data expected, legends and labels, files of each kind."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib.axes import Axes
+
+from mixed_order_game import PlotError, Result, plot
+
+T, N = 400, 5
+ORDER = (1, 1, 1, 2, 2)
+ALL_FIRST = (1, 1, 1, 1, 1)
+
+
+def make(order: tuple[int, ...] = ORDER, dimension: int = 2, stop: float = 20.0) -> Result:
+    time = np.linspace(0.0, stop, T)
+    columns = {}
+    for i in range(1, len(order) + 1):
+        for coordinate in range(1, dimension + 1):
+            index = f"[{i},{coordinate}]"
+            fall = (i - 3.0 * coordinate) * np.exp(-5.0 * time)
+            columns[f"x{index}"] = fall - 0.5
+            columns[f"u{index}"] = 0.0 * time
+            columns[f"x_star{index}"] = 0.0 * time - 0.5
+            if order[i - 1] == 2:
+                columns[f"v{index}"] = -5.0 * fall
+    columns["nash_error"] = np.exp(-5.0 * time)
+    edges = {"a[1,2]": 1.0, "a[2,3]": 2.0, "a[1,3]": 0.0}
+    return Result(time=time, columns=columns, parameters={"k1": 1.0, **edges}, units={"v[4,1]": "1/s"})
+
+
+def curves(axes: Axes) -> dict[str, np.ndarray]:
+    return {
+        str(line.get_label()): np.asarray(line.get_ydata())
+        for line in axes.lines
+        if not str(line.get_label()).startswith("_")
+    }
+
+
+def legend_texts(axes: Axes) -> list[str]:
+    legend = axes.get_legend()
+    assert legend is not None
+    return [text.get_text() for text in legend.get_texts()]
+
+
+def test_positions() -> None:
+    result = make()
+    axes = plot.plot_positions(result)
+    drawn = curves(axes)
+    assert len(drawn) == N * 2
+    np.testing.assert_array_equal(drawn["x[3,2]"], result["x[3,2]"])
+    assert axes.get_xlabel() == "time (s)"
+    assert axes.get_ylabel() == "action $x_{il}$"
+    assert sorted(legend_texts(axes)) == sorted(
+        [*(f"$i={i}$" for i in range(1, 6)), "$l=1$", "$l=2$", "$x^*$"]
+    )
+    styles = {str(line.get_label()): (line.get_color(), line.get_linestyle()) for line in axes.lines}
+    assert styles["x[1,1]"][0] == styles["x[1,2]"][0] != styles["x[2,1]"][0]
+    assert styles["x[1,1]"][1] == styles["x[2,1]"][1] != styles["x[1,2]"][1]
+
+
+def test_velocities_of_second_order_players_only() -> None:
+    axes = plot.plot_velocities(make())
+    assert set(curves(axes)) == {"v[4,1]", "v[4,2]", "v[5,1]", "v[5,2]"}
+    assert axes.get_ylabel() == "velocity $v_{il}$ (1/s)"
+    with pytest.raises(PlotError, match="no player of this game has a velocity"):
+        plot.plot_velocities(make(ALL_FIRST))
+
+
+def test_error_is_logarithmic() -> None:
+    axes = plot.plot_error({"one": make(), "two": make(stop=5.0)})
+    assert axes.get_yscale() == "log"
+    assert set(curves(axes)) == {"one", "two"}
+    assert legend_texts(axes) == ["one", "two"]
+    assert plot.plot_error(make()).get_legend() is None
+
+
+def test_plane_draws_paths_graph_and_equilibrium() -> None:
+    result = make()
+    axes = plot.plot_plane(result)
+    paths = [line for line in axes.lines if line.get_gid() == "path"]
+    edges = [line for line in axes.lines if line.get_gid() == "edge"]
+    assert len(paths) == N
+    np.testing.assert_array_equal(paths[3].get_xdata(), result["x[4,1]"])
+    ends = [np.column_stack(line.get_data()) for line in edges]
+    np.testing.assert_array_equal(ends, [result.x[0, [0, 1]], result.x[0, [1, 2]]])
+    assert [text.get_text() for text in axes.texts] == ["1", "2", "3", "4", "5"]
+    assert len([line for line in plot.plot_plane(result, edges=[]).lines if line.get_gid() == "edge"]) == 0
+    with pytest.raises(PlotError, match="3 coordinates, not 2"):
+        plot.plot_plane(make(dimension=3))
+
+
+def test_inset_enlarges_a_short_transient_and_covers_no_settled_curve() -> None:
+    (inset,) = plot.plot_positions(make()).child_axes
+    assert inset.get_xlim()[1] < 2.0
+    parent = plot.plot_positions(make())
+    low, high = parent.get_ylim()
+    settled = (-0.5 - low) / (high - low)
+    box = parent.child_axes[0].get_position()
+    own = parent.get_position()
+    bottom, top = ((edge - own.y0) / own.height for edge in (box.y0, box.y1))
+    assert not bottom < settled < top
+    assert plot.plot_positions(make(stop=1.0)).child_axes == []
+
+
+def test_axes_of_the_caller_are_used() -> None:
+    axes = plot.new_axes(4.0)
+    assert plot.plot_positions(make(), axes) is axes
+    figure = axes.get_figure(root=True)
+    assert figure is not None
+    assert figure.get_size_inches()[0] == 4.0
+
+
+def test_paper_figures() -> None:
+    four = ["positions_robust", "velocities_robust", "positions_unperturbed", "velocities_unperturbed"]
+    assert list(plot.paper_figures(make(), make(stop=5.0))) == [*four, "error", "plane"]
+    assert list(plot.paper_figures(make(ALL_FIRST, 1), make(ALL_FIRST, 1))) == [
+        "positions_robust",
+        "positions_unperturbed",
+        "error",
+    ]
+    assert list(plot.result_figures(make())) == ["positions", "velocities", "error", "plane"]
+
+
+def test_many_players_are_not_named_one_by_one() -> None:
+    axes = plot.plot_positions(make((1, 2) * 10))
+    assert legend_texts(axes) == ["$l=1$", "$l=2$", "$x^*$"]
+    assert len({str(line.get_color()) for line in axes.lines if str(line.get_label())[0] == "x"}) == 20
+
+
+@pytest.mark.parametrize(("suffix", "begin"), [(".pdf", b"%PDF"), (".svg", b"<?xml"), (".png", b"\x89PNG")])
+def test_files_are_reproducible(suffix: str, begin: bytes, tmp_path: Path) -> None:
+    written = [
+        plot.save_figure(plot.plot_plane(make()), tmp_path / name / f"plane{suffix}").read_bytes()
+        for name in ("a", "b")
+    ]
+    assert written[0].startswith(begin)
+    assert written[0] == written[1]
+
+
+def test_unknown_format(tmp_path: Path) -> None:
+    with pytest.raises(PlotError, match=r"must end in \.pdf, \.svg, \.png"):
+        plot.save_figure(plot.new_axes(), tmp_path / "a.bmp")

@@ -1,0 +1,216 @@
+"""Runs through fmpy: samples, inputs, changes on the way, reused instances, errors in the FMU's words."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mixed_order_game import SimulationError, Simulator, VariableError, run
+from tests.conftest import FmuOf
+
+
+@pytest.fixture(scope="module")
+def simulator(fmu: Path) -> Simulator:
+    return Simulator(fmu)
+
+
+def test_defaults(fmu: Path) -> None:
+    result = run(fmu)
+    assert result.time.shape == (1001,)
+    assert result.time[[0, -1]].tolist() == [0.0, 20.0]
+    assert result.x.shape == (1001, 5, 2)
+    np.testing.assert_array_equal(result.x[0], [[-5, 8], [-4, -6], [1, 8], [0, -8], [-1, 10]])
+    np.testing.assert_allclose(result.x_star, -0.5, atol=1e-12)
+    assert result.largest_error(16.0) < 0.00125
+    for signal in (result.v, result.z, result.u, result.phi, result.nn, result.W_norm2):
+        assert signal.shape == (1001, 5, 2)
+    assert not any(name.startswith(("y[", "W[")) for name in result.columns)
+    assert result.parameters["k1"] == 10.0
+    assert result["solver_steps"][-1] > 100
+    np.testing.assert_allclose(
+        result.nash_error, np.linalg.norm(result.x + 0.5, axis=(1, 2)), rtol=1e-9, atol=1e-14
+    )
+
+
+def test_chosen_outputs(simulator: Simulator) -> None:
+    result = simulator.run(stop_time=0.1, outputs=["y", "W", "x[1,2]", "cost"])
+    assert result.y.shape == (6, 5, 5, 2)
+    assert result.W.shape == (6, 5, 11, 2)
+    assert "x[1,2]" in result.columns
+    assert "x[1,1]" not in result.columns
+    assert result.x_star.shape == (5, 2)
+    assert np.all(result["cost[1]"] > 0.0)
+
+
+def test_start_values(simulator: Simulator) -> None:
+    values = {"x0[1,1]": 3.0, "k1": 20.0, "robust": False, "perturbed": False}
+    result = simulator.run(start_values=values, stop_time=4.0)
+    assert result.x[0, 0, 0] == 3.0
+    assert {name: result.parameters[name] for name in values} == values
+    assert result.largest_error(3.5) < 1e-6
+    np.testing.assert_array_equal(result.phi, 0.0)
+
+
+def test_reused_instance_equals_a_new_one(fmu: Path, simulator: Simulator) -> None:
+    simulator.run(start_values={"k1": 17.0, "x0[2,2]": 1.0}, stop_time=0.5)
+    with pytest.raises(VariableError):
+        simulator.run(start_values={"nonsense": 1.0})
+    again = simulator.run(stop_time=1.0)
+    fresh = run(fmu, stop_time=1.0)
+    for name, column in fresh.columns.items():
+        np.testing.assert_array_equal(again[name], column, err_msg=name)
+
+
+def test_samples(simulator: Simulator) -> None:
+    assert simulator.run(stop_time=0.25, step=0.1).time.tolist() == [0.0, 0.1, 0.2, 0.25]
+    assert simulator.run(stop_time=0.3, step=0.1).time == pytest.approx([0.0, 0.1, 0.2, 0.3], abs=1e-15)
+    assert simulator.run(stop_time=0.3, step=5.0).time.tolist() == [0.0, 0.3]
+    late = simulator.run(start_time=3.0, stop_time=4.0, step=0.5)
+    assert late.time.tolist() == [3.0, 3.5, 4.0]
+    np.testing.assert_array_equal(late.x[0, 0], [-5.0, 8.0])
+
+
+def test_tolerance_is_used(simulator: Simulator) -> None:
+    exact = simulator.run(stop_time=2.0, tolerance=1e-11)
+    errors = [
+        np.abs(simulator.run(stop_time=2.0, tolerance=tolerance).x - exact.x).max()
+        for tolerance in (1e-4, 1e-6, 1e-8)
+    ]
+    assert errors[0] > errors[1] > errors[2]
+    assert errors[2] < 1e-4
+
+
+def test_inputs_as_function_and_arrays(simulator: Simulator) -> None:
+    rng = np.random.default_rng(7)
+    constant = rng.normal(size=(5, 2))
+    by_function = simulator.run(stop_time=0.4, inputs=lambda _: constant)
+    by_array = simulator.run(stop_time=0.4, inputs=constant)
+    by_rows = simulator.run(stop_time=0.4, inputs=np.broadcast_to(constant, (21, 5, 2)))
+    by_value = simulator.run(
+        stop_time=0.4,
+        start_values={f"d_ext[{i + 1},{k + 1}]": constant[i, k] for i in range(5) for k in range(2)},
+    )
+    without = simulator.run(stop_time=0.4)
+    for other in (by_array, by_rows, by_value):
+        np.testing.assert_array_equal(by_function.x, other.x)
+    assert np.abs(by_function.x - without.x).max() > 1e-3
+
+
+def test_inputs_act_from_the_beginning_of_their_step(simulator: Simulator) -> None:
+    rows = np.zeros((11, 5, 2))
+    rows[5:, 0, 0] = 50.0
+    off = simulator.run(stop_time=1.0, step=0.1)
+    on = simulator.run(stop_time=1.0, step=0.1, inputs=rows)
+    difference = np.abs(on.x[:, 0, 0] - off.x[:, 0, 0])
+    assert difference[:6].max() < 1e-4
+    assert difference[6] > 1e-2
+
+
+def test_changes_on_the_way(simulator: Simulator) -> None:
+    options = {"stop_time": 1.0, "step": 0.1, "tolerance": 1e-9}
+    base = simulator.run(**options)  # type: ignore[arg-type]
+    # A change between two samples, and one at a sample that rounding hides.
+    changed = simulator.run(changes={0.35: {"k1": 30.0}, 0.1 + 0.2: {"k2": 1.0}}, **options)  # type: ignore[arg-type]
+    np.testing.assert_allclose(changed.x[:4], base.x[:4], rtol=0.0, atol=1e-7)
+    assert np.abs(changed.x[4:] - base.x[4:]).max() > 1e-6
+
+
+def test_costs_changed_on_the_way_move_the_equilibrium(simulator: Simulator) -> None:
+    values = {"robust": False, "perturbed": False}
+    changes = {5.0: {f"cost_linear[{i},1]": 0.0 for i in range(1, 6)}}
+    result = simulator.run(start_values=values, stop_time=10.0, changes=changes)
+    np.testing.assert_allclose(result.x_star, [[0.0, -0.5]] * 5, atol=1e-12)
+    assert result["x_star[1,1]"][0] == pytest.approx(-0.5)
+    assert result.largest_error(9.5) < 1e-6
+
+
+def test_progress(simulator: Simulator) -> None:
+    times: list[float] = []
+    simulator.run(stop_time=0.1, progress=times.append)
+    assert times == pytest.approx([0.02, 0.04, 0.06, 0.08, 0.1])
+
+
+def test_interrupted_run_leaves_the_simulator_usable(simulator: Simulator) -> None:
+    def stop(_: float) -> None:
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        simulator.run(progress=stop)
+    assert simulator.run(stop_time=0.1).time[-1] == 0.1
+
+
+@pytest.mark.parametrize(
+    ("options", "told"),
+    [
+        ({"stop_time": 0.0}, "stop_time = 0 s is not after start_time = 0 s"),
+        ({"stop_time": float("nan")}, "stop_time = nan"),
+        ({"step": 0.0}, "step = 0 s is not positive"),
+        ({"step": 1e-9}, "samples"),
+        ({"tolerance": 0.0}, "tolerance = 0 is not between 0 and 1"),
+        ({"inputs": [[1.0]]}, "inputs has the shape (1, 1), not (5, 2) or (1001, 5, 2)"),
+        ({"inputs": [[float("nan")] * 2] * 5}, "inputs must be finite"),
+        ({"inputs": lambda _: [0.0]}, "inputs(0) has the shape (1,), not (5, 2)"),
+        ({"changes": {20.0: {"k1": 1.0}}}, "the change at 20 s is outside [0, 20) s"),
+    ],
+)
+def test_options_that_make_no_sense(options: dict[str, object], told: str, simulator: Simulator) -> None:
+    with pytest.raises(SimulationError) as error:
+        simulator.run(**options)  # type: ignore[arg-type]
+    assert told in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("options", "told"),
+    [
+        ({"start_values": {"k5": 1.0}}, "there is no variable k5; did you mean k"),
+        ({"start_values": {"x[1,1]": 1.0}}, "cannot be set"),
+        ({"outputs": ["nothing"]}, "there is no variable nothing"),
+        ({"changes": {1.0: {"x0[1,1]": 1.0}}}, "cannot be set during a run"),
+    ],
+)
+def test_variables_that_cannot_be_used(options: dict[str, object], told: str, simulator: Simulator) -> None:
+    with pytest.raises(VariableError) as error:
+        simulator.run(**options)  # type: ignore[arg-type]
+    assert told in str(error.value)
+
+
+def test_the_fmus_own_words(simulator: Simulator) -> None:
+    cut = {"a[1,2]": 0.0, "a[2,3]": 0.0}
+    with pytest.raises(SimulationError, match="connected"):
+        simulator.run(start_values=cut)
+    assert simulator.run(start_values={**cut, "allow_disconnected": True}, stop_time=0.1).time[-1] == 0.1
+
+
+def test_divergence_is_an_error(simulator: Simulator) -> None:
+    unstable = {"robust": False, "perturbed": True, "x0[2,1]": 1000.0, "k1": 0.1}
+    with pytest.raises(SimulationError):
+        simulator.run(start_values=unstable, stop_time=20.0)
+    assert simulator.run(stop_time=0.1).time[-1] == 0.1
+
+
+def test_two_simulators_at_once(fmu: Path, fmu_of: FmuOf) -> None:
+    with Simulator(fmu) as one, Simulator(fmu_of("interleaved_orders")) as two, Simulator(fmu) as three:
+        two.run(stop_time=0.2)
+        first, third = one.run(stop_time=0.2), three.run(stop_time=0.2)
+    np.testing.assert_array_equal(first.x, third.x)
+
+
+def test_closed_simulator(fmu: Path) -> None:
+    with Simulator(fmu) as one:
+        folder = one._folder
+        assert folder.is_dir()
+    assert not folder.exists()
+    one.close()
+    with pytest.raises(SimulationError, match="closed"):
+        one.run()
+
+
+def test_fmu_for_another_machine(fmu: Path, tmp_path: Path) -> None:
+    import zipfile
+
+    other = tmp_path / "other.fmu"
+    with zipfile.ZipFile(fmu) as source, zipfile.ZipFile(other, "w") as target:
+        for name in source.namelist():
+            target.writestr(name.replace("linux64", "vax"), source.read(name))
+    with pytest.raises(SimulationError, match="cannot be loaded"):
+        Simulator(other)

@@ -1,0 +1,63 @@
+"""The linear loop from the FMU's variables against the paper's Kronecker expressions, and its rates."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mixed_order_game import read_model, spectrum
+from mixed_order_game.parameters import game_parameters
+from tests.conftest import GAMES, FmuOf
+from tests.oracle import equilibrium, linear_loop
+from tests.oracle.game import Game, read_game
+
+NAMES = ["five_vehicles", *sorted(path.stem for path in GAMES.glob("*.toml"))]
+FIVE_VEHICLES = Path(__file__).resolve().parents[2] / "modelDescription/games/five_vehicles.toml"
+
+
+def oracle_game(name: str) -> Game:
+    return read_game(FIVE_VEHICLES if name == "five_vehicles" else GAMES / f"{name}.toml")
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_matches_the_oracle(name: str, fmu_of: FmuOf) -> None:
+    game, other = game_parameters(read_model(fmu_of(name))), oracle_game(name)
+    expected, _ = linear_loop.linear_loop(other, dimension=1)
+    matrix = spectrum.linear_loop(game)
+    np.testing.assert_allclose(matrix, expected, rtol=1e-14, atol=1e-12)
+    assert spectrum.spectral_abscissa(matrix) == pytest.approx(linear_loop.spectral_abscissa(other))
+    np.testing.assert_allclose(
+        spectrum.nash_equilibrium(game), equilibrium.nash_equilibrium(other), atol=1e-12
+    )
+    m = equilibrium.strong_monotonicity_constant(other)
+    assert spectrum.monotonicity_constant(game) == pytest.approx(m)
+    N = other.players
+    consensus = np.kron(linear_loop.laplacian(other.adjacency), np.eye(N)) + np.diag(other.adjacency.ravel())
+    rate = other.k3 * np.linalg.eigvalsh(consensus).min()
+    assert spectrum.consensus_rate(game) == pytest.approx(rate)
+    np.testing.assert_allclose(game.dynamics_linear, other.dynamics_linear)
+    np.testing.assert_allclose(game.dynamics_square, other.dynamics_square)
+    np.testing.assert_allclose(game.y0, other.y0)
+
+
+def test_prediction_matches_the_oracle(fmu_of: FmuOf) -> None:
+    other = oracle_game("interleaved_orders")
+    times, deviation = spectrum.predicted_deviation(
+        game_parameters(read_model(fmu_of("interleaved_orders"))), 4.0, 100
+    )
+    size = other.players * other.dimension
+    x = linear_loop.exact_solution(other, times)[:, :size].reshape(-1, other.players, other.dimension)
+    np.testing.assert_allclose(deviation, x - equilibrium.nash_equilibrium(other), atol=1e-10)
+
+
+def test_changed_parameters_change_the_loop(fmu: Path) -> None:
+    model = read_model(fmu)
+    loose = game_parameters(model, {"k1": 5.0, "k3": 5.0, "k4": 5.0})
+    assert spectrum.spectral_abscissa(spectrum.linear_loop(game_parameters(model))) < 0.0
+    assert spectrum.spectral_abscissa(spectrum.linear_loop(loose)) > 0.0
+    assert game_parameters(model, {"a[1,2]": 0.5}).adjacency[1, 0] == 0.5
+
+
+def test_decay_rate_of_an_exponential() -> None:
+    times = np.linspace(1.0, 3.0, 50)
+    assert spectrum.decay_rate(times, 7.0 * np.exp(-2.5 * times)) == pytest.approx(2.5)
