@@ -17,9 +17,7 @@ struct CacheLineAllocator {
   template <typename Other>
   constexpr explicit CacheLineAllocator(const CacheLineAllocator<Other>& /*other*/) noexcept {}
 
-  Value* allocate(std::size_t count) {
-    return static_cast<Value*>(::operator new(count * sizeof(Value), alignment));
-  }
+  Value* allocate(std::size_t count) { return static_cast<Value*>(::operator new(count * sizeof(Value), alignment)); }
   void deallocate(Value* values, std::size_t /*count*/) noexcept { ::operator delete(values, alignment); }
 
   friend bool operator==(const CacheLineAllocator&, const CacheLineAllocator&) { return true; }

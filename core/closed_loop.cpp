@@ -7,8 +7,7 @@
 
 namespace mixed_order_game {
 
-ClosedLoop::ClosedLoop(Parameters parameters)
-    : parameters_(std::move(parameters)), layout_(parameters_.shape) {
+ClosedLoop::ClosedLoop(Parameters parameters) : parameters_(std::move(parameters)), layout_(parameters_.shape) {
   refresh();
 }
 
@@ -99,7 +98,7 @@ void ClosedLoop::evaluate(Real t, const Real* state, const Real* d_ext, const Mo
       const Real u = -(second ? gains.k4 : gains.k1) * e[p] - s[p] - phi[p];
       const Real driven = u + g[p] + d[p];
       signals.control[at(p)] = u;
-      rate[layout_.x() + p] = second ? reference[p] : driven;                            // x' = v or x' = u + g + d
+      rate[layout_.x() + p] = second ? reference[p] : driven;                     // x' = v or x' = u + g + d
       rate[layout_.reference() + p] = second ? driven : -gains.k2 * gradient[p];  // v' = u + g + d or z' = -k2 grad
     }
   }
@@ -130,8 +129,8 @@ void ClosedLoop::event_functions(const Real* state, const Modes& modes, Signals&
   weight_norms(state, values);
   if (std::any_of(modes.begin(), modes.end(), [](auto mode) { return mode != 0; })) evaluate_seeking(state, signals);
   for (std::size_t p = 0; p < modes.size(); ++p) {
-    const Real value = modes[p] != 0 ? -signals.error[p] * signals.network[p]
-                                     : values[p] / parameters_.rbf.W_max - 1.0 - hysteresis;
+    const Real value =
+        modes[p] != 0 ? -signals.error[p] * signals.network[p] : values[p] / parameters_.rbf.W_max - 1.0 - hysteresis;
     values[p] = value == 0.0 ? -almost_zero : value;
   }
 }

@@ -4,8 +4,7 @@
 
 namespace mixed_order_game {
 
-CommunicationGraph::CommunicationGraph(int players)
-    : players_(players), adjacency_(at(players) * at(players)) {
+CommunicationGraph::CommunicationGraph(int players) : players_(players), adjacency_(at(players) * at(players)) {
   refresh();
 }
 

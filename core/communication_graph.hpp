@@ -19,9 +19,7 @@ class CommunicationGraph {
 
   /// Rebuilds the rows of neighbours.
   void refresh();
-  [[nodiscard]] NeighbourRows neighbours() const {
-    return {start_.data(), neighbour_.data(), weight_.data()};
-  }
+  [[nodiscard]] NeighbourRows neighbours() const { return {start_.data(), neighbour_.data(), weight_.data()}; }
   /// Edges (i, j) with i < j and a_ij > 0, in order.
   [[nodiscard]] std::vector<std::pair<int, int>> edges() const;
 

@@ -15,8 +15,7 @@ namespace {
 
 class DenseCore final : public CoreSystem {
  public:
-  explicit DenseCore(int unknowns)
-      : unknowns_(unknowns), matrix_(at(unknowns) * at(unknowns)), pivot_(at(unknowns)) {}
+  explicit DenseCore(int unknowns) : unknowns_(unknowns), matrix_(at(unknowns) * at(unknowns)), pivot_(at(unknowns)) {}
 
   void clear() override { std::fill(matrix_.begin(), matrix_.end(), 0.0); }
   void add(int row, int column, Real value) override { matrix_[at(column * unknowns_ + row)] += value; }

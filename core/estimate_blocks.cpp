@@ -42,7 +42,8 @@ void EstimateBlocks::analyse(const CommunicationGraph& graph) {
     for (int a = start_[at(k)]; a < start_[at(k + 1)]; ++a) {
       for (int b = start_[at(k)]; b < a; ++b) {
         const int to = row_[at(b)];  // the entry at row[a] of column row[b]
-        const auto found = std::lower_bound(row_.begin() + start_[at(to)], row_.begin() + start_[at(to + 1)], row_[at(a)]);
+        const auto found =
+            std::lower_bound(row_.begin() + start_[at(to)], row_.begin() + start_[at(to + 1)], row_[at(a)]);
         target_.push_back(static_cast<int>(found - row_.begin()));
       }
     }

@@ -157,7 +157,7 @@ void read_dynamics(const TomlEntry& table, int i, const Shape& shape, std::vecto
   table.accept_keys({"linear", "square"});
   const int D = shape.dimension;
   std::vector<std::vector<PolynomialTerm>> of_player(at(shape.players));  // by j, then l; empty where j is not named
-  const auto read = [&](std::string_view key, Real PolynomialTerm::*coefficient) {
+  const auto read = [&](std::string_view key, Real PolynomialTerm::* coefficient) {
     read_pairs(table[key], shape.players, "[j, coefficients]", [&](int j, const TomlEntry& value) {
       std::vector<Real> coefficients(at(D));
       value.numbers(D, 1, coefficients.data());

@@ -34,9 +34,7 @@ using Size = sunindextype;
 void vector_linear_sum(SunReal a, N_Vector x, SunReal b, N_Vector y, N_Vector z) {
   kernels().linear_sum(NV_LENGTH_S(x), a, NV_DATA_S(x), b, NV_DATA_S(y), NV_DATA_S(z));
 }
-void vector_scale(SunReal c, N_Vector x, N_Vector z) {
-  kernels().scale(NV_LENGTH_S(x), c, NV_DATA_S(x), NV_DATA_S(z));
-}
+void vector_scale(SunReal c, N_Vector x, N_Vector z) { kernels().scale(NV_LENGTH_S(x), c, NV_DATA_S(x), NV_DATA_S(z)); }
 void vector_fill(SunReal c, N_Vector z) { kernels().fill(NV_LENGTH_S(z), c, NV_DATA_S(z)); }
 SunReal vector_weighted_norm(N_Vector x, N_Vector w) {
   const Size n = NV_LENGTH_S(x);

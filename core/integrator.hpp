@@ -29,8 +29,8 @@ struct Statistics {
   friend bool operator==(const Statistics&, const Statistics&) = default;
 };
 
-/// All that is needed to continue a run bit for bit, besides parameters and inputs: the last restart point and the count
-/// of steps since, with the state that they lead to.
+/// All that is needed to continue a run bit for bit, besides parameters and inputs: the last restart point and the
+/// count of steps since, with the state that they lead to.
 struct Checkpoint {
   Real restart_time = 0.0;
   AlignedVector restart_state;
@@ -46,8 +46,7 @@ struct Checkpoint {
 class Integrator {
  public:
   /// The loop and the input are read at every evaluation and must outlive the integrator.
-  Integrator(const ClosedLoop& loop, const ExternalDisturbance& input,
-             std::unique_ptr<NewtonSolver> newton_solver);
+  Integrator(const ClosedLoop& loop, const ExternalDisturbance& input, std::unique_ptr<NewtonSolver> newton_solver);
   ~Integrator();
   Integrator(const Integrator&) = delete;
   Integrator& operator=(const Integrator&) = delete;

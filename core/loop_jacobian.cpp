@@ -82,7 +82,8 @@ void LoopJacobian::multiply(const Real* vector, Real* product) const {
         const Real* dyi = dy + i * n;
         Real along = 0.0;
         for (int k = 0; k < n; ++k) {
-          const Real c = parameters.rbf.diagonal ? parameters.rbf.centers[at(m)] : parameters.rbf.centers[at(m * n + k)];
+          const Real c =
+              parameters.rbf.diagonal ? parameters.rbf.centers[at(m)] : parameters.rbf.centers[at(m * n + k)];
           along += (yi[k] - c) * dyi[k];
         }
         for (int p = i; p < n; p += shape.players) dS[m * n + p] = activation[at(m * n + p)] * factor * along;
@@ -117,10 +118,10 @@ void LoopJacobian::multiply(const Real* vector, Real* product) const {
     const Real dr = dnetwork[p] * inverse_bound[at(p)];
     for (int m = 0; m < shape.neurons; ++m) {
       const int k = m * n + p;
-      product[layout.weights() + k] =
-          parameters.strategy.robust
-              ? gains.beta * (de * (activation[at(k)] - r * weights[at(k)]) + e * (dS[k] - dr * weights[at(k)] - r * dW[k]))
-              : 0.0;
+      product[layout.weights() + k] = parameters.strategy.robust
+                                          ? gains.beta * (de * (activation[at(k)] - r * weights[at(k)]) +
+                                                          e * (dS[k] - dr * weights[at(k)] - r * dW[k]))
+                                          : 0.0;
     }
   }
   kernel.estimate_rates(shape.players, shape.dimension, parameters.graph.neighbours(), gains.k3, dy, dshared,

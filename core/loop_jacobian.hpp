@@ -32,15 +32,15 @@ class LoopJacobian {
   [[nodiscard]] const ClosedLoop& loop() const { return *loop_; }
 
   /// The numbers it is made of, indexed by entry(i, l) unless said otherwise.
-  AlignedVector estimates;   ///< y
-  AlignedVector weights;     ///< W
-  AlignedVector activation;  ///< S
-  AlignedVector error;       ///< e
-  AlignedVector network;     ///< w'S
-  AlignedVector slope;       ///< d phi / d e
+  AlignedVector estimates;      ///< y
+  AlignedVector weights;        ///< W
+  AlignedVector activation;     ///< S
+  AlignedVector error;          ///< e
+  AlignedVector network;        ///< w'S
+  AlignedVector slope;          ///< d phi / d e
   AlignedVector inverse_bound;  ///< 1 / W_max on the sphere, else 0
-  AlignedVector hessian;     ///< along Cost::hessian_pattern()
-  AlignedVector dynamics;    ///< along UnknownDynamics::jacobian_pattern(); zero when not perturbed
+  AlignedVector hessian;        ///< along Cost::hessian_pattern()
+  AlignedVector dynamics;       ///< along UnknownDynamics::jacobian_pattern(); zero when not perturbed
 
  private:
   const ClosedLoop* loop_;

@@ -44,27 +44,27 @@ class StructuredNewton final : public NewtonSolver {
   std::unique_ptr<CoreSystem> core_;
 
   // sizes
-  int n_ = 0;                     // N D
-  int functional_count_ = 0;      // K: how many numbers the activations of one player depend on
+  int n_ = 0;                         // N D
+  int functional_count_ = 0;          // K: how many numbers the activations of one player depend on
   std::vector<std::uint8_t> second_;  // per entry: order 2
   std::vector<int> first_order_;      // per entry: number of dx in the core system, -1 for order 2
 
   // weights; all per column p
-  AlignedVector stiffness_;     // k1 or k4, plus d phi/d e, plus A
-  AlignedVector inverse_a2_;    // h = S'b / a2
+  AlignedVector stiffness_;   // k1 or k4, plus d phi/d e, plus A
+  AlignedVector inverse_a2_;  // h = S'b / a2
   AlignedVector inverse_a1_;
-  AlignedVector squares_;       // |S|^2
-  AlignedVector scratch_;       // 2 n
-  AlignedVector sensitivity_;   // kappa'dS = sum_k sensitivity[k * n + p] functional[k * n + p]
+  AlignedVector squares_;             // |S|^2
+  AlignedVector scratch_;             // 2 n
+  AlignedVector sensitivity_;         // kappa'dS = sum_k sensitivity[k * n + p] functional[k * n + p]
   AlignedVector weight_sensitivity_;  // w'dS likewise
   AlignedVector zeros_, ones_;
 
   // one solve
-  AlignedVector functionals_;   // k * n + p: functional k of the player of p
-  AlignedVector network_rhs_;   // h
+  AlignedVector functionals_;  // k * n + p: functional k of the player of p
+  AlignedVector network_rhs_;  // h
   AlignedVector core_rhs_;
-  AlignedVector shared_;        // dxbar
-  AlignedVector gradient_;      // Hessian rows times dy
+  AlignedVector shared_;    // dxbar
+  AlignedVector gradient_;  // Hessian rows times dy
   AlignedVector from_error_, from_activation_, onto_weight_;
   AlignedVector activation_change_;
 };
@@ -325,7 +325,8 @@ void StructuredNewton::solve(Real* b) {
       dg += jacobian_->dynamics[at(k)] * dx[dynamics.column[at(k)]];
     }
     const Real B = stiffness_[at(p)];
-    dreference[p] = (dreference[p] - gamma_ * (h[p] + kappa_dS[p] + B * k2 * gradient_[at(p)] - dg)) / (1.0 + gamma_ * B);
+    dreference[p] =
+        (dreference[p] - gamma_ * (h[p] + kappa_dS[p] + B * k2 * gradient_[at(p)] - dg)) / (1.0 + gamma_ * B);
   }
   if (!robust) return;
 
@@ -368,8 +369,8 @@ std::unique_ptr<NewtonSolver> make_structured_newton(bool coupled) {
   return std::make_unique<StructuredNewton>(coupled);
 }
 
-// Measured at N = 2 to 200 and widths from 0.3 to 7: without the coupling CVODE needs the same number of iterations, and
-// each costs less.
+// Measured at N = 2 to 200 and widths from 0.3 to 7: without the coupling CVODE needs the same number of iterations,
+// and each costs less.
 std::unique_ptr<NewtonSolver> make_newton_solver(const Shape& /*shape*/) { return make_structured_newton(false); }
 
 }  // namespace mixed_order_game

@@ -1,7 +1,6 @@
 // Adaptation of the weights, W' = beta e (S - radial W), and the sums w'S and w'w; part of level.cpp.
 
-void column_products(int n, int rows, const double* __restrict a, const double* __restrict b,
-                     double* __restrict sum) {
+void column_products(int n, int rows, const double* __restrict a, const double* __restrict b, double* __restrict sum) {
   for (int p = 0; p < n; ++p) sum[p] = 0.0;
   for (int m = 0; m < rows; ++m) {
     const double* __restrict am = a + m * n;
@@ -11,8 +10,7 @@ void column_products(int n, int rows, const double* __restrict a, const double* 
 }
 
 void weight_rates(int n, int neurons, double beta, const double* __restrict e, const double* __restrict radial,
-                  const double* __restrict activation, const double* __restrict weights,
-                  double* __restrict rate) {
+                  const double* __restrict activation, const double* __restrict weights, double* __restrict rate) {
   for (int m = 0; m < neurons; ++m) {
     const double* __restrict s = activation + m * n;
     const double* __restrict w = weights + m * n;
@@ -38,8 +36,8 @@ void weight_corrections(int n, int neurons, const double* __restrict scale_of, c
 }
 
 void network_moments(int n, int neurons, const double* __restrict centers, const double* __restrict activation,
-                     const double* __restrict weights, double* __restrict squares,
-                     double* __restrict centered_squares, double* __restrict centered_products) {
+                     const double* __restrict weights, double* __restrict squares, double* __restrict centered_squares,
+                     double* __restrict centered_products) {
   for (int p = 0; p < n; ++p) squares[p] = centered_squares[p] = centered_products[p] = 0.0;
   for (int m = 0; m < neurons; ++m) {
     const double c = centers[m];

@@ -49,8 +49,8 @@ struct Kernels {
   /// sum[p] = sum over m of a[m * n + p] * b[m * n + p]
   void (*column_products)(int n, int rows, const double* a, const double* b, double* sum);
   /// W' = beta e (S - radial W), row by row; radial[p] is 0 inside and w'S / W_max on the sphere.
-  void (*weight_rates)(int n, int neurons, double beta, const double* e, const double* radial,
-                       const double* activation, const double* weights, double* rate);
+  void (*weight_rates)(int n, int neurons, double beta, const double* e, const double* radial, const double* activation,
+                       const double* weights, double* rate);
   /// sum and sum of squares of n numbers
   void (*moments)(int n, const double* a, double* sum, double* sum_of_squares);
   double (*dot)(int n, const double* a, const double* b);

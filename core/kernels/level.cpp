@@ -2,9 +2,9 @@
 //
 // Nothing from the standard library's templates may be used here: an inline function compiled with wide instructions
 // could be picked by the linker for callers on every processor.
-#include "kernels.hpp"
-
 #include <math.h>
+
+#include "kernels.hpp"
 
 #define MIXED_ORDER_GAME_TEXT_OF(name) #name
 #define MIXED_ORDER_GAME_TEXT(name) MIXED_ORDER_GAME_TEXT_OF(name)
@@ -17,13 +17,13 @@ extern const Kernels MIXED_ORDER_GAME_JOIN(kernels_, MIXED_ORDER_GAME_LEVEL);
 
 namespace {
 
-#include "elementary.ipp"
-#include "sums.ipp"
-#include "rbf_network.ipp"
-#include "estimate_dynamics.ipp"
 #include "adaptation.ipp"
-#include "estimate_blocks.ipp"
 #include "dense_lu.ipp"
+#include "elementary.ipp"
+#include "estimate_blocks.ipp"
+#include "estimate_dynamics.ipp"
+#include "rbf_network.ipp"
+#include "sums.ipp"
 #include "vector_operations.ipp"
 
 }  // namespace

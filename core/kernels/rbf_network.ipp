@@ -31,8 +31,8 @@ void activations_diagonal(int players, int dimension, int neurons, const double*
   exponentiate_and_repeat(players, dimension, neurons, exponent, activation);
 }
 
-void activations_general(int players, int dimension, int neurons, const double* centers, double width,
-                         const double* y, double* __restrict exponent, double* __restrict activation) {
+void activations_general(int players, int dimension, int neurons, const double* centers, double width, const double* y,
+                         double* __restrict exponent, double* __restrict activation) {
   const int n = players * dimension;
   const double scale = 1.0 / (width * width);
   for (int i = 0; i < players; ++i) {
