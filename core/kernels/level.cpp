@@ -17,14 +17,16 @@ extern const Kernels MIXED_ORDER_GAME_JOIN(kernels_, MIXED_ORDER_GAME_LEVEL);
 
 namespace {
 
-#include "adaptation.ipp"
-#include "dense_lu.ipp"
+// clang-format off: the order matters
 #include "elementary.ipp"
-#include "estimate_blocks.ipp"
-#include "estimate_dynamics.ipp"
-#include "rbf_network.ipp"
 #include "sums.ipp"
+#include "rbf_network.ipp"
+#include "estimate_dynamics.ipp"
+#include "adaptation.ipp"
+#include "estimate_blocks.ipp"
+#include "dense_lu.ipp"
 #include "vector_operations.ipp"
+// clang-format on
 
 }  // namespace
 

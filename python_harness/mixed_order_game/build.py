@@ -82,14 +82,23 @@ def default_game() -> Path:
 
 
 def shipped_game(name: str) -> Path:
-    """Game file that comes with the package, by name without suffix. Raises BuildError if there is none."""
-    for folder in _package_folders():
-        path = folder / "games" / f"{name}.toml"
-        if path.is_file():
-            return path
-    raise BuildError(
-        f"this installation carries no game {name}: install the package mixed-order-game with pip"
-    )
+    """Game file that comes with the package, by name without suffix.
+
+    Raises GameError if there is no such game, BuildError if this installation carries none at all.
+    """
+    games = shipped_games()
+    if name not in games:
+        raise GameError(f"there is no game {name}; those that come with the package are {', '.join(games)}")
+    return games[name]
+
+
+def shipped_games() -> dict[str, Path]:
+    """Game files that come with the package, by name. Raises BuildError if this installation carries none."""
+    found = (path for folder in _package_folders() for path in (folder / "games").glob("*.toml"))
+    games = {path.stem: path for path in sorted(found)}
+    if not games:
+        raise BuildError("this installation carries no games: install the package mixed-order-game with pip")
+    return games
 
 
 def native_directory() -> Path:

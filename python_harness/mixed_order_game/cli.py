@@ -43,7 +43,9 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 
-GAME_HELP = "An FMU (.fmu) or a game file (.toml); the paper's example when left out."
+GAME_HELP = (
+    "An FMU (.fmu), a game file (.toml) or a game of the package by name; the paper's example when left out."
+)
 Game = Annotated[Path | None, typer.Argument(help=GAME_HELP, show_default=False)]
 
 
@@ -84,7 +86,10 @@ def root(
 def build(
     game: Annotated[
         Path | None,
-        typer.Argument(help="A game file (.toml); the paper's example when left out.", show_default=False),
+        typer.Argument(
+            help="A game file (.toml) or a game of the package by name; the paper's example when left out.",
+            show_default=False,
+        ),
     ] = None,
     output: Annotated[Path, typer.Option("--output", "-o", help="The FMU to write.")] = Path(
         "MixedOrderGame.fmu"
@@ -96,7 +101,7 @@ def build(
     """
     from .build import build_fmu, default_game
 
-    typer.echo(build_fmu(default_game() if game is None else game, output))
+    typer.echo(build_fmu(default_game() if game is None else _game_file(game), output))
 
 
 @app.command()
@@ -216,7 +221,7 @@ def plot(
     source: Annotated[
         Path | None,
         typer.Argument(
-            help="A result (.parquet, .csv), an FMU or a game file; the paper's example when left out.",
+            help="A result (.parquet, .csv), or what run takes; the paper's example when left out.",
             show_default=False,
         ),
     ] = None,
@@ -259,9 +264,7 @@ def demo(
     ),
     fmu: Annotated[
         Path | None,
-        typer.Option(
-            help="The FMU (or game file) to use; the paper's example when left out.", show_default=False
-        ),
+        typer.Option(help="The FMU or game to use; the paper's example when left out.", show_default=False),
     ] = None,
     file_format: Annotated[FigureFormat, typer.Option("--format", help="File format.")] = FigureFormat.PNG,
 ) -> None:
@@ -292,9 +295,18 @@ def _fmu(game: Path | None) -> Path:
         return default_fmu()
     if game.suffix == ".fmu":
         return game
+    return cached_fmu(_game_file(game))
+
+
+def _game_file(game: Path) -> Path:
+    """The game file meant by an argument: a file, or a game of the package by its name."""
+    from .build import shipped_game
+
     if game.suffix == ".toml":
-        return cached_fmu(game)
-    raise GameError(f"{game} is neither an FMU (.fmu) nor a game file (.toml)")
+        return game
+    if game.suffix:
+        raise GameError(f"{game} is neither an FMU (.fmu) nor a game file (.toml)")
+    return shipped_game(str(game))
 
 
 def _setting(text: str) -> tuple[str, float | bool]:

@@ -1,4 +1,4 @@
-"""Designs of experiments: grids, Latin hypercube and Sobol samples (scipy.stats.qmc), random initial states."""
+"""Designs of experiments: grids, Latin hypercube and Sobol samples, random initial states."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -74,7 +74,9 @@ def grid_of_text(text: str) -> tuple[Value, ...]:
         return values
     parts, logarithmic = _range_parts(text)
     if len(parts) != COUNTED_RANGE or not parts[2].isdigit():
-        raise DesignError(f"{text!r} is not a grid: 1,2,5 or FIRST:LAST:COUNT or FIRST:LAST:COUNT:log expected")
+        raise DesignError(
+            f"{text!r} is not a grid: 1,2,5 or FIRST:LAST:COUNT or FIRST:LAST:COUNT:log expected"
+        )
     return Range(_number(parts[0]), _number(parts[1]), logarithmic).points(int(parts[2]))
 
 
@@ -91,7 +93,9 @@ def sample(ranges: Mapping[str, Range], count: int, sampling: Sampling, seed: in
     if sampling is Sampling.SOBOL:
         if count & (count - 1):
             below = 1 << (count.bit_length() - 1)
-            raise DesignError(f"a Sobol design is balanced for a power of two: {below} or {2 * below}, not {count}")
+            raise DesignError(
+                f"a Sobol design is balanced for a power of two: {below} or {2 * below}, not {count}"
+            )
         unit = qmc.Sobol(len(ranges), rng=generator).random(count)
     else:
         unit = qmc.LatinHypercube(len(ranges), rng=generator).random(count)

@@ -73,7 +73,7 @@ class CommunicationGraph:
         return edge_values(model, {(i, j): weight for i, j, weight in self.edges})
 
 
-def edge_values(model: Model, weights: Mapping[tuple[int, int], float]) -> dict[str, float]:
+def edge_values(model: Model, weights: Mapping[tuple[int, ...], float]) -> dict[str, float]:
     """Start values of every a[i,j] of a game; 0 where weights, by 1-based (i, j) with i < j, has none.
 
     Raises GraphError for an edge that is not a variable of the FMU.
@@ -81,7 +81,9 @@ def edge_values(model: Model, weights: Mapping[tuple[int, int], float]) -> dict[
     variables = model.indexed("a")
     for i, j in weights:
         if (i, j) not in variables:
-            raise GraphError(f"the FMU has no edge a[{i},{j}]: its game exposes only the edges of its own graph")
+            raise GraphError(
+                f"the FMU has no edge a[{i},{j}]: its game exposes only the edges of its own graph"
+            )
     return {variable.name: float(weights.get(pair, 0.0)) for pair, variable in variables.items()}
 
 
@@ -98,6 +100,13 @@ def from_networkx(graph: Any) -> CommunicationGraph:
 def graph_of_model(model: Model) -> CommunicationGraph:
     """The graph of an FMU's start values."""
     return CommunicationGraph(model.players, model.edges)
+
+
+def graph_of(adjacency: NDArray[np.float64]) -> CommunicationGraph:
+    """The graph of a symmetric matrix of weights a_ij (N, N)."""
+    rows, columns = np.nonzero(np.triu(adjacency, 1))
+    pairs = zip(rows.tolist(), columns.tolist(), strict=True)
+    return CommunicationGraph(len(adjacency), tuple((i + 1, j + 1, float(adjacency[i, j])) for i, j in pairs))
 
 
 def graph_of_text(text: str, players: int) -> CommunicationGraph:
@@ -131,7 +140,9 @@ def connected_classes(players: int) -> Iterator[CommunicationGraph]:
     import networkx as nx
 
     if not 2 <= players <= LARGEST_CLASSES:  # noqa: PLR2004
-        raise GraphError(f"classes of graphs are listed for 2 to {LARGEST_CLASSES} players, not for {players}")
+        raise GraphError(
+            f"classes of graphs are listed for 2 to {LARGEST_CLASSES} players, not for {players}"
+        )
     for graph in nx.graph_atlas_g():
         if len(graph) == players and nx.is_connected(graph):
             yield from_networkx(graph)
@@ -177,15 +188,15 @@ def _generators() -> dict[str, tuple[int, bool, Generator]]:
 
 
 GRAPHS_HELP = (
-    "all (every connected labelled graph), classes (one of every isomorphism class), ring, path, star, wheel, "
-    "complete, tree, random:P, regular:DEGREE, small-world:K:P, scale-free:M, geometric:RADIUS, own (the "
-    "game's), or edges such as 1-2,2-3:0.5; @COUNT after a random kind draws as many"
+    "all (every connected labelled graph), classes (one of every isomorphism class), ring, path, star, "
+    "wheel, complete, tree, random:P, regular:DEGREE, small-world:K:P, scale-free:M, geometric:RADIUS, "
+    "own (the game's), or edges such as 1-2,2-3:0.5; @COUNT after a random kind draws as many"
 )
 
 
-def graphs_of_text(text: str, players: int, *, seed: int = 0, own: CommunicationGraph | None = None) -> (
-    list[CommunicationGraph]
-):
+def graphs_of_text(
+    text: str, players: int, *, seed: int = 0, own: CommunicationGraph | None = None
+) -> list[CommunicationGraph]:
     """Graphs by name, as GRAPHS_HELP tells; own is the graph called own. Random ones are drawn connected.
 
     Raises GraphError for a name or argument that makes no sense.
@@ -202,7 +213,9 @@ def graphs_of_text(text: str, players: int, *, seed: int = 0, own: Communication
     name, *argument_texts = kind.split(":")
     generators = _generators()
     if name not in generators:
-        raise GraphError(f"there is no kind of graph {name!r}: it is one of all, classes, {', '.join(generators)}")
+        raise GraphError(
+            f"there is no kind of graph {name!r}: it is one of all, classes, {', '.join(generators)}"
+        )
     needed, random, generate = generators[name]
     try:
         arguments = [float(argument) for argument in argument_texts]
@@ -210,7 +223,9 @@ def graphs_of_text(text: str, players: int, *, seed: int = 0, own: Communication
     except ValueError:
         raise GraphError(f"{text!r} is not a kind of graph with numbers after : and @") from None
     if len(arguments) != needed:
-        raise GraphError(f"{name} takes {needed} number{'s' * (needed != 1)} after a colon, not {len(arguments)}")
+        raise GraphError(
+            f"{name} takes {needed} number{'s' * (needed != 1)} after a colon, not {len(arguments)}"
+        )
     if count < 1 or (count > 1 and not random):
         raise GraphError(f"{text!r}: the count is 1 for a kind that is not random, and positive for others")
     if not 2 <= players <= LARGEST_PLAYERS:  # noqa: PLR2004

@@ -5,7 +5,16 @@ from pathlib import Path
 
 import pytest
 
-from mixed_order_game import BuildError, GameError, build, build_fmu, cached_fmu, default_fmu, default_game
+from mixed_order_game import (
+    BuildError,
+    GameError,
+    build,
+    build_fmu,
+    cached_fmu,
+    default_fmu,
+    default_game,
+    read_model,
+)
 from tests.conftest import GAMES
 
 
@@ -71,10 +80,17 @@ def test_cache(fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> No
     assert cached_fmu(GAMES / "two_scalar_players.toml") != first
 
 
+@pytest.mark.parametrize("name", sorted(build.shipped_games()))
+def test_games_of_the_package(name: str, tmp_path: Path) -> None:
+    assert read_model(build_fmu(build.shipped_game(name), tmp_path / f"{name}.fmu")).title
+    with pytest.raises(GameError, match=f"there is no game {name}s; those that come with the package are"):
+        build.shipped_game(f"{name}s")
+
+
 def test_installation_without_compiled_parts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     game = default_game()
     monkeypatch.setattr(build, "_package_folders", lambda: iter([tmp_path]))
     with pytest.raises(BuildError, match="carries no compiled FMU"):
         build_fmu(game, tmp_path / "a.fmu")
-    with pytest.raises(BuildError, match="carries no game five_vehicles"):
+    with pytest.raises(BuildError, match="carries no games"):
         default_game()

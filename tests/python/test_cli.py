@@ -100,6 +100,7 @@ def test_files_that_are_no_games(command: str, tmp_path: Path) -> None:
     (tmp_path / "text.fmu").write_text("text")
     (tmp_path / "bad.toml").write_text("title = 1")
     assert "neither an FMU" in sentence(mog(command, tmp_path / "game.txt"))
+    assert "there is no game nothing; those" in sentence(mog(command, "nothing"))
     assert "there is no FMU" in sentence(mog(command, tmp_path / "none.fmu"))
     assert "cannot be read" in sentence(mog(command, tmp_path / "text.fmu"))
     assert "there is no game file" in sentence(mog(command, tmp_path / "none.toml"))
@@ -155,7 +156,7 @@ def test_run_writes_files(suffix: str, fmu: Path, tmp_path: Path) -> None:
 
 def test_run_takes_a_game_or_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    for arguments in ([], [default_game()]):
+    for arguments in ([], [default_game()], ["five_vehicles"]):
         result = mog("run", *arguments, "--stop-time", 0.1)
         assert result.exit_code == 0
         assert "Connectivity control of five vehicles" in result.stdout

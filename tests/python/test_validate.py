@@ -94,7 +94,8 @@ def test_unstable_gains_fail_theorem_2(tmp_path: Path) -> None:
 def test_strongly_unstable_loop_is_judged_before_it_overflows(tmp_path: Path) -> None:
     text = default_game().read_text().replace("k2 = 1.0", "k2 = 50.0")
     game = tmp_path / "wild.toml"
-    game.write_text(text.replace("order = 2", "order = 1").replace("v0 = [0.0, 0.0]", ""))
+    text = text.replace("order = 2", "order = 1").replace("v0 = [0.0, 0.0]", "")
+    game.write_text(text.replace("square = [[2, [1.0, 0.0]]]", "square = []"))
     verdict = validate(build_fmu(game, tmp_path / "wild.fmu"))
     assert verdict.plain.stop_time < 20.0
     assert {claim.name for claim in verdict.claims if not claim.passed} >= {"theorem_2_stability"}
