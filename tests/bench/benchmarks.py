@@ -1,0 +1,396 @@
+"""The benchmark suite: each part writes a JSON file, and all parts together a table and a figure.
+
+Peers and core solve the same hybrid problem; the reference trajectory of the paper's case comes from an
+independent integration with tight tolerance. Times are CPU seconds of the integration alone, in one thread.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import platform
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import psutil
+
+from tests.oracle.game import FloatArray, read_game
+
+from . import report
+from .peers.core import Core
+from .peers.hybrid_model import Solution
+from .scaling_game import scaling_game
+
+ROOT = Path(__file__).resolve().parents[2]
+PROGRAMS = ROOT / "build" / "bench" / "tests" / "bench"
+PAPER_GAME = ROOT / "modelDescription" / "games" / "five_vehicles.toml"
+REFERENCE = ROOT / "tests" / "reference" / "five_vehicles.npz"
+DOCUMENT = ROOT / "python_harness" / "docs" / "benchmarks.md"
+FIGURE = ROOT / "python_harness" / "docs" / "benchmarks.png"
+
+Solve = Callable[[float], Solution]
+Result = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Context:
+    """What every part needs."""
+
+    quick: bool
+    jit: bool
+    fmu: Path
+    scratch: Path
+
+    @property
+    def core(self) -> Core:
+        """The paper's case: 200 outputs over 20 s."""
+        return Core(PROGRAMS / "core_run", PAPER_GAME, 20.0, 200)
+
+
+class PaperReference:
+    """The stored trajectory of the paper's case, by an independent integrator at rtol 1e-13."""
+
+    def __init__(self) -> None:
+        with np.load(REFERENCE) as stored:
+            self.times: FloatArray = stored["t"]
+            self.x = stored["x"].transpose(0, 2, 1).reshape(len(self.times), -1)
+            self.zv = (stored["z"] + stored["v"]).transpose(0, 2, 1).reshape(len(self.times), -1)
+            players = stored["x"].shape[1]
+            self.switches = [
+                (float(t), int(coordinate - 1) * players + int(player - 1))
+                for t, player, coordinate in zip(
+                    stored["switch_time"], stored["switch_player"], stored["switch_coordinate"], strict=True
+                )
+            ]
+
+    def error(self, states: FloatArray) -> float:
+        """Largest error of an entry of x at an output time."""
+        return float(np.max(np.abs(states[:, : self.x.shape[1]] - self.x)))
+
+    def relative_error(self, states: FloatArray) -> float:
+        """Largest error of x, z, v at an output time, each over the largest value of its column (or 1)."""
+        exact = np.hstack([self.x, self.zv])
+        scale = np.maximum(1.0, np.max(np.abs(exact), axis=0))
+        return float(np.max(np.abs(states[:, : exact.shape[1]] - exact) / scale))
+
+
+def peers(context: Context, reference: PaperReference) -> dict[str, Solve]:
+    """Every peer that is installed, in the order of the tables."""
+    from .peers.casadi_cvodes import CasadiCvodes
+    from .peers.scipy_solvers import ScipySolver
+    from .peers.sundae_cvode import SundaeCvode
+
+    game, times = read_game(PAPER_GAME), reference.times
+    found: dict[str, Solve] = {"CasADi CVODES": CasadiCvodes(game, times, reference.switches).solve}
+    if context.jit:
+        found["CasADi CVODES, compiled"] = CasadiCvodes(game, times, reference.switches, jit=True).solve
+    found["scikit-sundae CVODE"] = SundaeCvode(game, times).solve
+    found["SciPy LSODA"] = ScipySolver(game, times, "LSODA").solve
+    found["SciPy BDF"] = ScipySolver(game, times, "BDF", sparse=True).solve
+    found["SciPy Radau"] = ScipySolver(game, times, "Radau", sparse=True).solve
+    if context.fmu.exists():
+        from .peers.fmu import FmuThroughFmpy
+
+        found["this FMU through fmpy"] = FmuThroughFmpy(
+            game, times, context.fmu, context.scratch / "fmu"
+        ).solve
+    else:
+        print(f"no FMU at {context.fmu}: left out", file=sys.stderr)
+    return found
+
+
+def paired(context: Context) -> Result:
+    """The paper's case at equal true error: each peer at 1e-6, the core as loose as gives no worse error."""
+    reference, core = PaperReference(), context.core
+    tight = core.run(1e-13)
+    grid = [10.0 ** (-3.0 - k / 10.0) for k in range(61)]
+    errors = [reference.error(core.run(rtol).trajectory) for rtol in grid]
+    rows = []
+    for name, solve in peers(context, reference).items():
+        peer_error = reference.error(solve(1e-6).states)
+        # the loosest tolerance that serves, and whose neighbour serves too: not a lucky one
+        enough = [k for k in range(60) if max(errors[k : k + 2]) <= peer_error]
+        rtol = grid[enough[0]] if enough else grid[-1]
+        pairs = []
+        for _ in range(3 if context.quick else 11):
+            theirs = solve(1e-6).cpu
+            pairs.append((theirs, core.run(rtol, repetitions=5).median))
+        ratios = [theirs / ours for theirs, ours in pairs]
+        rows.append(
+            {
+                "peer": name,
+                "peer_error": peer_error,
+                "peer_cpu": float(np.median([theirs for theirs, _ in pairs])),
+                "core_rtol": rtol,
+                "core_error": errors[grid.index(rtol)],
+                "core_cpu": float(np.median([ours for _, ours in pairs])),
+                "ratio": float(np.median(ratios)),
+                "ratio_range": [min(ratios), max(ratios)],
+            }
+        )
+        print(f"  {name}: {rows[-1]['ratio']:.1f}", flush=True)
+    return {"core_at_1e-13_against_reference": reference.error(tight.trajectory), "rows": rows}
+
+
+def precision(context: Context) -> Result:
+    """True error and time over the tolerance, for the core and every peer."""
+    reference, core = PaperReference(), context.core
+    tolerances = [10.0**-k for k in range(3, 8 if context.quick else 11)]
+    curves: dict[str, list[Result]] = {"this core": []}
+    for rtol in tolerances:
+        run = core.run(rtol, repetitions=5)
+        curves["this core"].append(
+            {
+                "rtol": rtol,
+                "cpu": run.median,
+                "error": reference.error(run.trajectory),
+                "relative_error": reference.relative_error(run.trajectory),
+                "steps": run.steps,
+                "rate_evaluations": run.rate_evaluations,
+                "setups": run.setups,
+            }
+        )
+    for name, solve in peers(context, reference).items():
+        curves[name] = []
+        for rtol in tolerances:
+            try:
+                solve(rtol)  # caches and integrators made for this tolerance
+                found = [solve(rtol) for _ in range(1 if context.quick else 3)]
+            except (ArithmeticError, RuntimeError) as failure:
+                print(f"  {name} at {rtol:g}: {failure}", file=sys.stderr)
+                continue
+            cpu = float(np.median([solution.cpu for solution in found]))
+            curves[name].append({"rtol": rtol, "cpu": cpu, "error": reference.error(found[0].states)})
+        print(f"  {name}", flush=True)
+    return {"curves": curves}
+
+
+def scaling(context: Context) -> Result:
+    """Time and memory of the scaling family, 100 outputs over 10 s at rtol 1e-6, in pairs; KLU at N = 20."""
+    sizes = [5, 20, 50, 100] if context.quick else [5, 20, 50, 100, 200]
+    cores = {}
+    for players in sizes:
+        file = context.scratch / f"scaling_{players}.toml"
+        file.write_text(scaling_game(players))
+        cores[players] = Core(PROGRAMS / "core_run", file, 10.0, 100)
+    times: dict[int, list[float]] = {players: [] for players in sizes}
+    ratios: dict[int, list[float]] = {players: [] for players in sizes}
+    runs = {}
+    for _ in range(2 if context.quick else 5):
+        for players in sizes:
+            # each size against a run of N = 20 just before it
+            near = cores[20].run(1e-6, repetitions=5).median
+            runs[players] = cores[players].run(1e-6, repetitions=5 if players <= 50 else 1)
+            times[players].append(runs[players].median)
+            ratios[players].append(runs[players].median / near)
+    median = {players: float(np.median(times[players])) for players in sizes}
+    rows = [
+        {
+            "players": players,
+            "states": runs[players].states,
+            "cpu": median[players],
+            "ratio_to_20": float(np.median(ratios[players])),
+            "peak_mb": runs[players].peak_mb,
+            "steps": runs[players].steps,
+            "rate_evaluations": runs[players].rate_evaluations,
+            "setups": runs[players].setups,
+            "solves": runs[players].solves,
+            "events": runs[players].events,
+        }
+        for players in sizes
+    ]
+    fitted = [players for players in sizes if 20 <= players <= 100]
+    exponent = np.polyfit(np.log(fitted), np.log([median[players] for players in fitted]), 1)[0]
+    result: Result = {"rows": rows, "exponent_20_to_100": float(exponent)}
+    if 200 in sizes:
+        result["exponent_100_to_200"] = float(np.log2(median[200] / median[100]))
+    result["klu"] = _klu(context, cores[20])
+    return result
+
+
+def _klu(context: Context, core: Core) -> Result:
+    """KLU in place of the structured solver: same integrator, same Jacobian, same events, N = 20."""
+    if context.quick:
+        core = Core(core.program, core.game, 0.5, 5)
+    exact = core.run(1e-11).trajectory
+    result: Result = {"stop": core.stop}
+    rounds = 1 if context.quick else 3
+    columns = exact.shape[1] // 2
+    for solver in ("klu", "klu-ordered"):
+        pairs = []
+        for _ in range(rounds):
+            theirs = core.run(1e-6, solver=solver)
+            ours = core.run(1e-6, repetitions=5)
+            pairs.append((theirs.median, ours.median))
+        result[solver] = {
+            "cpu": float(np.median([theirs for theirs, _ in pairs])),
+            "core_cpu": float(np.median([ours for _, ours in pairs])),
+            "ratio": float(np.median([theirs / ours for theirs, ours in pairs])),
+            "setups": theirs.setups,
+            "peak_mb": theirs.peak_mb,
+            "error": float(np.max(np.abs(theirs.trajectory - exact)[:, :columns])),
+            "core_error": float(np.max(np.abs(ours.trajectory - exact)[:, :columns])),
+        }
+    return result
+
+
+def overhead(context: Context) -> Result:
+    """fmi2DoStep against the bare core at 2,000 communication points, with and without reading outputs."""
+    if not context.fmu.exists():
+        raise FileNotFoundError(f"{context.fmu} is missing: ./dev build makes it")
+    import fmpy
+
+    folder = Path(fmpy.extract(str(context.fmu), unzipdir=str(context.scratch / "overhead")))
+    description: Any = fmpy.read_model_description(str(folder))
+    game = read_game(PAPER_GAME)
+    reference = {v.name: v.valueReference for v in description.modelVariables}
+    entries = [(i, c) for c in range(1, game.dimension + 1) for i in range(1, game.players + 1)]
+    names = [f"{letter}[{i},{c}]" for letter in ("x", "v", "u") for i, c in entries]
+    names = [name for name in names if name in reference] + ["nash_error"]
+    library = next((folder / "binaries").rglob(f"{description.coSimulation.modelIdentifier}.so"))
+    words = [
+        PROGRAMS / "fmu_step_run",
+        PAPER_GAME,
+        library,
+        (folder / "resources").as_uri(),
+        description.guid,
+        ",".join(str(reference[name]) for name in names),
+        20.0,
+        2000,
+        1e-6,
+        11 if context.quick else 41,
+    ]
+    done = subprocess.run([str(word) for word in words], check=True, capture_output=True, text=True)
+    measured = json.loads(done.stdout)
+    pair = {
+        "step": (measured["fmu"], measured["core"]),
+        "step_and_outputs": (measured["fmu_with_outputs"], measured["core_with_outputs"]),
+    }
+    return {"steps": 2000, "difference": measured["difference"]} | {
+        name: {
+            "fmu": float(np.median(theirs)),
+            "core": float(np.median(ours)),
+            "overhead": float(np.median(np.array(theirs) / np.array(ours)) - 1.0),
+        }
+        for name, (theirs, ours) in pair.items()
+    }
+
+
+def microbench(context: Context) -> Result:
+    """Right-hand side, set-up and solve, against the machine's measured peak."""
+    games = {"paper": PAPER_GAME}
+    for players in (20, 50, 100, 200):
+        games[f"{players} players"] = context.scratch / f"scaling_{players}.toml"
+        games[f"{players} players"].write_text(scaling_game(players))
+    words = [str(PROGRAMS / "microbench"), "--benchmark_format=json"]
+    words += [f"--benchmark_min_time={0.05 if context.quick else 0.5}", "--benchmark_repetitions=3"]
+    words += [f"{name}={file}" for name, file in games.items()]
+    done = subprocess.run(words, check=True, capture_output=True, text=True)
+    rows = [
+        {
+            "name": row["run_name"],
+            "seconds": row["cpu_time"] * 1e-9,
+            **{
+                key: row[key]
+                for key in ("states", "seconds_per_state", "bytes_per_second", "flops_per_second")
+                if key in row
+            },
+        }
+        for row in json.loads(done.stdout)["benchmarks"]
+        if row.get("aggregate_name") == "median"
+    ]
+    run = context.core.run(1e-6, repetitions=11)
+    rate = next(row["seconds"] for row in rows if row["name"] == "rate/paper")
+    return {
+        "rows": rows,
+        "paper_run": {
+            "cpu": run.median,
+            "rate_evaluations": run.rate_evaluations,
+            "over_its_rate_evaluations": run.median / (rate * run.rate_evaluations),
+        },
+    }
+
+
+PARTS: dict[str, Callable[[Context], Result]] = {
+    "paired": paired,
+    "precision": precision,
+    "scaling": scaling,
+    "overhead": overhead,
+    "microbench": microbench,
+}
+
+
+def machine() -> Result:
+    """Processor, compiler and versions."""
+    model = platform.processor()
+    if Path("/proc/cpuinfo").exists():
+        lines = Path("/proc/cpuinfo").read_text().splitlines()
+        model = next((line.split(":")[1].strip() for line in lines if line.startswith("model name")), model)
+        family = [
+            next((line.split(":")[1].strip() for line in lines if line.startswith(f"{key}\t")), "?")
+            for key in ("cpu family", "model")
+        ]
+        model += f" (family {family[0]}, model {family[1]})"
+    compiler = subprocess.run(
+        [shutil.which("c++") or "c++", "--version"], capture_output=True, text=True, check=False
+    )
+    packages = ("numpy", "scipy", "numba", "casadi", "scikit-sundae", "fmpy")
+    return {
+        "processor": model,
+        "cores": psutil.cpu_count(logical=False) or psutil.cpu_count(),
+        "memory_gb": round(psutil.virtual_memory().total / 2**30, 1),
+        "system": f"{platform.system()} {platform.release()}",
+        "compiler": compiler.stdout.splitlines()[0] if compiler.stdout else "?",
+        "python": platform.python_version(),
+        "versions": {package: version(package) for package in packages},
+    }
+
+
+def main() -> None:
+    """Run the parts asked for, and write their results."""
+    parser = argparse.ArgumentParser(prog="./dev bench", description=__doc__)
+    parser.add_argument("--quick", action="store_true", help="minutes; the documentation is left as it is")
+    parser.add_argument("--only", choices=PARTS, action="append", help="one part; may be repeated")
+    parser.add_argument("--output", type=Path, default=ROOT / "build" / "bench" / "results")
+    parser.add_argument("--fmu", type=Path, default=ROOT / "build" / "fmu" / "MixedOrderGame.fmu")
+    parser.add_argument(
+        "--jit", action="store_true", help="also CasADi with its compiled functions: minutes of compiling"
+    )
+    arguments = parser.parse_args()
+    output: Path = arguments.output.resolve()
+    output.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory() as scratch:
+        context = Context(arguments.quick, arguments.jit, arguments.fmu.resolve(), Path(scratch))
+        for name in arguments.only or PARTS:
+            print(f"{name} ...", flush=True)
+            before = os.getloadavg()[0]
+            try:
+                result = PARTS[name](context)
+            except FileNotFoundError as missing:
+                print(f"  left out: {missing}", file=sys.stderr)
+                continue
+            result |= {"quick": arguments.quick, "machine": machine(), "load": [before, os.getloadavg()[0]]}
+            (output / f"{name}.json").write_text(json.dumps(result, indent=1) + "\n")
+    files = {name: output / f"{name}.json" for name in PARTS}
+    results = {name: json.loads(file.read_text()) for name, file in files.items() if file.exists()}
+    text = report.markdown(results)
+    (output / "benchmarks.md").write_text(text)
+    print(text)
+    report.figure(results, output / "benchmarks.png")
+    if not arguments.quick and not any(result["quick"] for result in results.values()):
+        report.insert(text, DOCUMENT)
+        if (output / "benchmarks.png").exists():
+            FIGURE.write_bytes((output / "benchmarks.png").read_bytes())
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,290 @@
+"""Tables and figure of the benchmark results."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+Results = dict[str, Any]
+BEGIN, END = "<!-- benchmarks: begin -->", "<!-- benchmarks: end -->"
+
+
+def _milliseconds(seconds: float) -> str:
+    return f"{1e3 * seconds:.3g}" if seconds < 1.0 else f"{1e3 * seconds:.0f}"
+
+
+def _table(head: list[str], rows: list[list[str]]) -> list[str]:
+    return [
+        "| " + " | ".join(head) + " |",
+        "|" + "---|" * len(head),
+        *["| " + " | ".join(row) + " |" for row in rows],
+        "",
+    ]
+
+
+def _verdict(value: float, bound: float, *, at_least: bool) -> str:
+    met = value >= bound if at_least else value <= bound
+    return f"{'at least' if at_least else 'at most'} {bound:g}: {'met' if met else '**missed**'}"
+
+
+def markdown(results: Results) -> str:
+    """All parts that have results, as Markdown."""
+    lines: list[str] = []
+    for part in ("paired", "precision", "scaling", "overhead", "microbench"):
+        if part in results:
+            lines += globals()[f"_{part}"](results[part])
+    if results:
+        lines += _machine(results)
+    return "\n".join(lines).rstrip() + "\n"
+
+
+def _paired(result: Results) -> list[str]:
+    targets = {"CasADi CVODES": 30.0, "SciPy BDF": 50.0, "SciPy Radau": 50.0}
+    rows = []
+    for row in result["rows"]:
+        bound = targets.get(row["peer"])
+        low, high = row["ratio_range"]
+        rows.append(
+            [
+                row["peer"],
+                _milliseconds(row["peer_cpu"]),
+                f"{row['peer_error']:.1e}",
+                f"{row['core_rtol']:.1e}",
+                _milliseconds(row["core_cpu"]),
+                f"{row['core_error']:.1e}",
+                f"**{row['ratio']:.1f}** ({low:.1f} to {high:.1f})",
+                _verdict(row["ratio"], bound, at_least=True) if bound else "",
+            ]
+        )
+    difference = result["core_at_1e-13_against_reference"]
+    return [
+        "### The paper's case at equal true error",
+        "",
+        "200 outputs over 20 s. Each peer at rtol 1e-6; the core at the loosest rtol that gives no worse "
+        "largest error of x (and whose neighbour in the grid of ten per decade gives none either). CPU"
+        " milliseconds, medians of alternated pairs; the ratio is peer over core. The core at rtol 1e-13"
+        f" differs from the reference by {difference:.0e}.",
+        "",
+        *_table(
+            ["peer", "its ms", "its error", "core's rtol", "core's ms", "core's error", "ratio", "target"],
+            rows,
+        ),
+    ]
+
+
+def _precision(result: Results) -> list[str]:
+    curves = result["curves"]
+    tolerances = [row["rtol"] for row in curves["this core"]]
+    rows = []
+    for name, curve in curves.items():
+        found = {row["rtol"]: row for row in curve}
+        cells = [
+            f"{_milliseconds(found[rtol]['cpu'])} / {found[rtol]['error']:.0e}" if rtol in found else "failed"
+            for rtol in tolerances
+        ]
+        rows.append([name, *cells])
+    own = [
+        [
+            f"{row['rtol']:.0e}",
+            f"{row['error']:.1e}",
+            f"{row['relative_error']:.1e}",
+            _milliseconds(row["cpu"]),
+            str(row["steps"]),
+            str(row["rate_evaluations"]),
+            str(row["setups"]),
+        ]
+        for row in curves["this core"]
+    ]
+    return [
+        "### Work and precision",
+        "",
+        "CPU milliseconds / largest error of x, over rtol (the absolute tolerance is 0.01 rtol).",
+        "",
+        *_table(["", *[f"{rtol:.0e}" for rtol in tolerances]], rows),
+        "![True error against time, and time against the number of players](benchmarks.png)",
+        "",
+        "The core's error falls with the tolerance:",
+        "",
+        *_table(
+            ["rtol", "error of x", "relative error of x, z, v", "ms", "steps", "right-hand sides", "set-ups"],
+            own,
+        ),
+    ]
+
+
+def _scaling(result: Results) -> list[str]:
+    rows = []
+    memory = {100: 60.0, 200: 250.0}
+    ratio = {100: 40.0, 200: 200.0}
+    for row in result["rows"]:
+        players = row["players"]
+        against, peak = f"{row['ratio_to_20']:.2f}", f"{row['peak_mb']:.1f}"
+        if players in ratio:
+            against += f" ({_verdict(row['ratio_to_20'], ratio[players], at_least=False)})"
+            peak += f" ({_verdict(row['peak_mb'], memory[players], at_least=False)})"
+        counts = [str(row[key]) for key in ("steps", "rate_evaluations", "setups", "events")]
+        rows.append([str(players), str(row["states"]), _milliseconds(row["cpu"]), against, peak, *counts])
+    exponent = result["exponent_20_to_100"]
+    text = f"Time grows with exponent **{exponent:.2f}** in N from 20 to 100"
+    text += f" ({_verdict(exponent, 2.2, at_least=False)})"
+    if "exponent_100_to_200" in result:
+        text += f"; from 100 to 200: {result['exponent_100_to_200']:.2f}"
+    klu = result["klu"]
+    own, told = klu["klu"], klu["klu-ordered"]
+    return [
+        "### Scaling",
+        "",
+        "The scaling family, 100 outputs over 10 s, rtol 1e-6. CPU milliseconds, medians; the ratio to N = 20"
+        " is that of runs next to each other; memory is that of the whole process at its peak.",
+        "",
+        *_table(
+            ["N", "states", "ms", "ratio to N = 20", "MB", "steps", "right-hand sides", "set-ups", "events"],
+            rows,
+        ),
+        text + ".",
+        "",
+        f"KLU on the sparse Newton matrix in the same integrator at N = 20 over {klu['stop']:g} s:"
+        f" {_milliseconds(own['cpu'])} ms with the better of its own orderings, **{own['ratio']:.0f} times**"
+        f" the core's {_milliseconds(own['core_cpu'])} ms ({_verdict(own['ratio'], 40.0, at_least=True)});"
+        f" errors of x {own['error']:.1e} and {own['core_error']:.1e}. Told to eliminate weights, then"
+        " estimates, then the rest, which is the insight that the structured solver is built on, it takes"
+        f" {_milliseconds(told['cpu'])} ms, {told['ratio']:.1f} times the core's.",
+        "",
+    ]
+
+
+def _overhead(result: Results) -> list[str]:
+    rows = []
+    for key, name in (("step", "steps alone"), ("step_and_outputs", "steps, then x, v, u and nash_error")):
+        row = result[key]
+        rows.append(
+            [
+                name,
+                _milliseconds(row["fmu"]),
+                _milliseconds(row["core"]),
+                f"{100.0 * row['overhead']:.1f} %",
+                _verdict(100.0 * row["overhead"], 5.0, at_least=False),
+            ]
+        )
+    return [
+        "### What the FMI layer costs",
+        "",
+        f"The paper's case in {result['steps']} calls of fmi2DoStep from C++ against the bare core doing the"
+        " same steps, interpolations and outputs, rtol 1e-6; CPU milliseconds per run, medians of pairs.",
+        "",
+        *_table(["", "FMU's ms", "core's ms", "overhead", "target, %"], rows),
+    ]
+
+
+def _microbench(result: Results) -> list[str]:
+    rows = []
+    peaks = []
+    for row in result["rows"]:
+        bandwidth = f"{row['bytes_per_second'] / 1e9:.1f}" if "bytes_per_second" in row else ""
+        arithmetic = f"{row['flops_per_second'] / 1e9:.1f}" if "flops_per_second" in row else ""
+        if row["name"].startswith("peak/"):
+            peaks.append([row["name"].removeprefix("peak/").replace("_", "-"), bandwidth, arithmetic])
+            continue
+        part, game = row["name"].split("/", 1)
+        part = {"rate": "right-hand side", "setup": "linearize and set up", "solve": "solve"}[part]
+        per_state = f"{1e9 * row['seconds_per_state']:.2f}"
+        rows.append([part, game, f"{1e6 * row['seconds']:.3g}", per_state, bandwidth, arithmetic])
+    run = result["paper_run"]
+    return [
+        "### Parts",
+        "",
+        "Bytes are the least traffic, what must be read and written once; operations are counted for the"
+        " right-hand side only.",
+        "",
+        *_table(["", "game", "microseconds", "ns per state", "GB/s", "Gflop/s"], rows),
+        "What the machine can do, in one thread: a triad c = a + 3 b over working sets of these sizes, and"
+        " multiplies with adds that are not fused, as in the kernels.",
+        "",
+        *_table(["", "GB/s", "Gflop/s"], peaks),
+        f"The paper's run at rtol 1e-6 takes {_milliseconds(run['cpu'])} ms for {run['rate_evaluations']}"
+        f" right-hand sides: {run['over_its_rate_evaluations']:.1f} times what those alone take.",
+        "",
+    ]
+
+
+def _machine(results: Results) -> list[str]:
+    first = next(iter(results.values()))["machine"]
+    loads = [load for result in results.values() for load in result["load"]]
+    versions = ", ".join(f"{name} {number}" for name, number in first["versions"].items())
+    return [
+        "### Machine",
+        "",
+        f"{first['processor']}, {first['cores']} cores, {first['memory_gb']} GB, {first['system']};"
+        f" {first['compiler']}; Python {first['python']}, {versions}."
+        f" Load average while measuring: {min(loads):.1f} to {max(loads):.1f}.",
+        "",
+    ]
+
+
+def insert(text: str, document: Path) -> None:
+    """Replaces what lies between the markers of a document. Raises ValueError if it has none."""
+    before, found, rest = document.read_text().partition(BEGIN)
+    _, ended, after = rest.partition(END)
+    if not found or not ended:
+        raise ValueError(f"{document} lacks the markers {BEGIN} and {END}")
+    document.write_text(f"{before}{BEGIN}\n\n{text}\n{END}{after}")
+
+
+def figure(results: Results, file: Path) -> None:
+    """Work-precision diagram, and time over the number of players."""
+    import matplotlib as mpl
+
+    mpl.use("Agg")
+    import matplotlib.pyplot as plt
+
+    panels = [name for name in ("precision", "scaling") if name in results]
+    if not panels:
+        return
+    plt.rcParams.update({"font.size": 9, "axes.spines.top": False, "axes.spines.right": False})
+    drawing, all_axes = plt.subplots(1, len(panels), figsize=(5.2 * len(panels), 3.9), squeeze=False)
+    for axes, panel in zip(all_axes[0], panels, strict=True):
+        axes.set_xscale("log")
+        axes.set_yscale("log")
+        axes.grid(visible=True, which="major", linewidth=0.4, color="0.85")
+        (_draw_precision if panel == "precision" else _draw_scaling)(axes, results[panel])
+    drawing.tight_layout()
+    drawing.savefig(file, dpi=120)
+    plt.close(drawing)
+
+
+def _draw_precision(axes: Any, result: Results) -> None:
+    colors = ["#0072B2", "#D55E00", "#E69F00", "#CC79A7", "#009E73", "#56B4E9", "#999999", "#000000"]
+    for (name, curve), color, marker in zip(result["curves"].items(), colors, "os^vDP*X", strict=False):
+        own = name == "this core"
+        axes.plot(
+            [row["error"] for row in curve],
+            [1e3 * row["cpu"] for row in curve],
+            marker=marker,
+            markersize=5 if own else 4,
+            linewidth=2.0 if own else 1.0,
+            color=color,
+            label=name,
+        )
+    axes.set_xlabel("largest error of x")
+    axes.set_ylabel("CPU time, ms")
+    axes.set_title("The paper's five vehicles, 20 s")
+    axes.invert_xaxis()
+    axes.set_ylim(top=8.0 * axes.get_ylim()[1])  # room for the legend
+    axes.legend(fontsize=7, frameon=False, loc="upper left", ncols=2)
+
+
+def _draw_scaling(axes: Any, result: Results) -> None:
+    players = [row["players"] for row in result["rows"]]
+    axes.plot(players, [1e3 * row["cpu"] for row in result["rows"]], "o-", color="#0072B2", label="this core")
+    klu = result["klu"]
+    if klu["stop"] == 10.0:
+        axes.plot([20], [1e3 * klu["klu"]["cpu"]], "s", color="#D55E00", label="KLU, its own ordering")
+        axes.plot(
+            [20], [1e3 * klu["klu-ordered"]["cpu"]], "^", color="#E69F00", label="KLU, told the structure"
+        )
+    axes.set_xticks(players, [str(number) for number in players])
+    axes.minorticks_off()
+    axes.set_xlabel("players N")
+    axes.set_ylabel("CPU time, ms")
+    axes.set_title(f"Scaling family, 10 s (exponent {result['exponent_20_to_100']:.2f} from 20 to 100)")
+    axes.legend(fontsize=7, frameon=False)
