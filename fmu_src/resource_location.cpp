@@ -2,6 +2,9 @@
 
 #include <cstdio>
 #include <memory>
+#ifdef _WIN32
+#include <filesystem>
+#endif
 
 #include "errors.hpp"
 
@@ -30,6 +33,15 @@ std::string percent_decoded(std::string_view text) {
   }
   return decoded;
 }
+
+#ifdef _WIN32
+// fopen takes char for another code than UTF-8 there
+std::FILE* open(const std::string& path) {
+  return _wfopen(std::filesystem::path(std::u8string(path.begin(), path.end())).c_str(), L"rb");
+}
+#else
+std::FILE* open(const std::string& path) { return std::fopen(path.c_str(), "rb"); }
+#endif
 
 }  // namespace
 
@@ -65,7 +77,7 @@ std::string path_of(std::string_view resource_location) {
 // C streams: those of C++ would pull functions of the newest C library into the FMU.
 std::string content_of(const std::string& path) {
   constexpr std::size_t most = 64 * 1024 * 1024;
-  const std::unique_ptr<std::FILE, int (*)(std::FILE*)> file(std::fopen(path.c_str(), "rb"), std::fclose);
+  const std::unique_ptr<std::FILE, int (*)(std::FILE*)> file(open(path), std::fclose);
   if (!file) throw Error("cannot open " + path);
   std::string content;
   char block[16384];

@@ -491,6 +491,7 @@ TEST(HostileGameDefinition, CannotExhaustTheStack) {
   for (const std::string string : {R"("")", R"('')", R"("""""")", R"("""x"""")", R"("""x""""")", R"("\"")", R"('\')",
                                    R"('''x'''')", R"("""\"""")", R"("#")", R"("""'""")"}) {
     EXPECT_EQ(refusal("b = " + string + "\n" + key + " = 1"), dots) << string;
+    EXPECT_EQ(refusal("\nb = {c = " + string + ", " + key + " = 1}"), dots) << string;
   }
   EXPECT_EQ(refusal("# don't \"\"\"\n" + key + " = 1"), dots);
 }

@@ -286,7 +286,7 @@ TEST(Behaviour05NoGrowth, SavingAndFreeing) {
   for (int k = 0; k < 100; ++k) cycle();
   const std::size_t before = mallinfo2().uordblks;
   for (int k = 0; k < 20'000 / patience; ++k) cycle();
-  EXPECT_LE(mallinfo2().uordblks, before + 4096);
+  EXPECT_LE(mallinfo2().uordblks, before + 16384);
 }
 
 TEST(Behaviour05NoGrowth, InstantiatingAndFreeing) {
@@ -300,7 +300,7 @@ TEST(Behaviour05NoGrowth, InstantiatingAndFreeing) {
   for (int k = 0; k < 20; ++k) cycle();
   const std::size_t before = mallinfo2().uordblks;
   for (int k = 0; k < 2'000 / patience; ++k) cycle();
-  EXPECT_LE(mallinfo2().uordblks, before + 4096);
+  EXPECT_LE(mallinfo2().uordblks, before + 16384);
 }
 
 TEST(Behaviour06Reset, EqualsAFreshInstance) {

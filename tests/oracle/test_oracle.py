@@ -228,8 +228,9 @@ def test_plain_strategy_is_without_network() -> None:
     now = signals(game, state)
     np.testing.assert_allclose(now.u[:, 0], [-7 * now.e[0, 0], -3 * now.e[1, 0]], rtol=1e-13)
     s = unpack(game, state_rate(game, 1.0, state, np.zeros((2, 1), dtype=np.bool_), column(5.0, 6.0)))
-    np.testing.assert_allclose(s.p[0], now.u[0])
-    np.testing.assert_allclose(s.x[1], now.u[1])
+    # the external disturbance is no part of the game's own perturbation
+    np.testing.assert_allclose(s.p[0], now.u[0] + 5.0)
+    np.testing.assert_allclose(s.x[1], now.u[1] + 6.0)
     assert not s.W.any()
 
 
