@@ -14,7 +14,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 import typer.core
 
+from .analysis.command import register as register_analyse
+from .authoring.command import register as register_authoring
+from .compare_command import register as register_compare
 from .errors import GameError, MixedOrderGameError
+from .reporting.command import register as register_report
+from .sweep_command import register as register_sweep
+from .tune_command import register as register_tune
 from .version import package_version
 
 if TYPE_CHECKING:
@@ -152,6 +158,17 @@ def run(
             "All but y and W when left out.",
         ),
     ] = None,
+    graph_schedule: Annotated[
+        Path | None,
+        typer.Option(help="Graphs that switch during the run, .toml or .csv.", show_default=False),
+    ] = None,
+    disturbance: Annotated[
+        Path | None,
+        typer.Option(help="External disturbance d_ext over time, .csv.", show_default=False),
+    ] = None,
+    linear_disturbance: Annotated[
+        bool, typer.Option("--linear-disturbance", help="Straight between its rows, not held.")
+    ] = False,
 ) -> None:
     r"""Run a game through fmpy and write or summarize the result.
 
@@ -160,9 +177,12 @@ def run(
     mog run --set k1=12 --set "a\[1,3]=0.5" --output result.parquet
 
     mog run my_game.toml --stop-time 5 --variables x,v,nash_error --output result.csv
+
+    mog run --graph-schedule switching.toml --disturbance gust.csv
     """
     from .names import split_names
     from .run import Simulator
+    from .schedule import read_disturbance, read_graph_schedule
     from .tables import print_result
 
     values = dict(_setting(text) for text in settings or [])
@@ -174,6 +194,9 @@ def run(
         model = simulator.model
         stop = model.stop_time if stop_time is None else stop_time
         span = stop - start_time
+        schedule = None if graph_schedule is None else read_graph_schedule(graph_schedule, model)
+        if schedule is not None:
+            values = {**schedule.start_values(start_time), **values}
         result = simulator.run(
             start_values=values,
             start_time=start_time,
@@ -181,6 +204,10 @@ def run(
             step=model.step if step is None else step,
             tolerance=model.tolerance if tolerance is None else tolerance,
             outputs=None if not variables else [name for text in variables for name in split_names(text)],
+            changes=None if schedule is None else schedule.changes(stop, start_time),
+            inputs=None
+            if disturbance is None
+            else read_disturbance(disturbance, model, linear=linear_disturbance),
             progress=lambda time: show("simulating", (time - start_time) / span),
         )
     if output is not None:
@@ -280,6 +307,14 @@ def demo(
     for file in done.files:
         typer.echo(file)
     _report(done.validation, as_json=False)
+
+
+register_analyse(app)
+register_authoring(app)
+register_report(app)
+register_compare(app)
+register_sweep(app)
+register_tune(app)
 
 
 def main() -> None:

@@ -41,8 +41,8 @@ class Metrics:
     band: float  # band of the settling time, in the unit of x
 
     def as_json(self) -> dict[str, float | None]:
-        """Plain values for json.dumps; None in place of NaN."""
-        return {name: None if np.isnan(value) else value for name, value in asdict(self).items()}
+        """Plain values for json.dumps; None for what is not finite."""
+        return {name: value if np.isfinite(value) else None for name, value in asdict(self).items()}
 
 
 METRIC_UNITS: Mapping[str, str] = {

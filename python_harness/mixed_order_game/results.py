@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     import pandas as pd
     import xarray
 
+    from .metrics import Metrics
+
 FloatArray = NDArray[np.float64]
 
 METADATA_KEY = b"mixed_order_game"
@@ -52,6 +54,10 @@ class Result:
     step: float = float("nan")  # s
     tolerance: float = float("nan")  # relative
     messages: tuple[str, ...] = ()  # what the FMU logged
+    changed: Mapping[str, float | bool] = field(
+        default_factory=dict
+    )  # parameters and inputs that differ from the FMU's start values
+    seed: int | None = None  # of whatever was drawn for the run; None if nothing was
 
     def __post_init__(self) -> None:
         for name, column in self.columns.items():
@@ -156,6 +162,13 @@ class Result:
         """Largest |v_il| over second-order players and the samples in [begin, end]; 0 if all have order 1."""
         return _largest(np.nan_to_num(self.v), self.window(begin, end))
 
+    @property
+    def metrics(self) -> "Metrics":
+        """Settling time, overshoot, control energy, final error, events; raises ResultError without x."""
+        from .metrics import metrics
+
+        return metrics(self)
+
     def window(self, begin: float, end: float) -> NDArray[np.bool_]:
         """(T,), true for samples in [begin, end], in s, rounding forgiven. Raises ResultError if none is."""
         slack = 1e-9 * (1.0 + float(np.max(np.abs(self.time), initial=0.0)))
@@ -235,6 +248,7 @@ class Result:
         pa.parquet.write_table(table.replace_schema_metadata({METADATA_KEY: metadata}), file)
 
     def _metadata(self, *, flat: bool = False) -> dict[str, Any]:
+        stems = {parse_name(name)[0] for name in self.columns}
         metadata: dict[str, Any] = {
             "title": self.title,
             "guid": self.guid,
@@ -245,6 +259,9 @@ class Result:
         }
         nested = {
             "parameters": dict(self.parameters),
+            "changed": dict(self.changed),
+            "seed": self.seed,
+            "metrics": self.metrics.as_json() if {"x", "x_star"} <= stems else {},
             "units": dict(self.units),
             "messages": list(self.messages),
         }
@@ -282,6 +299,7 @@ def _read_parquet(path: Path) -> Result:
     table = pyarrow.parquet.read_table(path)
     metadata = json.loads((table.schema.metadata or {})[METADATA_KEY])
     metadata["messages"] = tuple(metadata["messages"])
+    metadata.pop("metrics", None)  # Result computes them from its columns
     columns = {name: table.column(name).to_numpy() for name in table.column_names}
     return Result(time=columns.pop("time"), columns=columns, **metadata)
 

@@ -179,6 +179,9 @@ class Simulator:
             step=step,
             tolerance=tolerance,
             messages=tuple(message for _, message in self._messages),
+            changed={
+                name: value for name, value in parameters.items() if self.model.variable(name).start != value
+            },
         )
 
     def _initialize(self, values: Mapping[str, Value], time: NDArray[np.float64], tolerance: float) -> None:

@@ -236,7 +236,8 @@ TEST(Integrator, AnInputActsFromTheRestartOn) {
 }
 
 TEST(Integrator, StopsWithTheTimeReachedWhenTheSolutionEscapes) {
-  testing::PlainGame game = testing::random_game({.seed = 3, .players = 2, .dimension = 1, .neurons = 2, .robust = false});
+  testing::PlainGame game =
+      testing::random_game({.seed = 3, .players = 2, .dimension = 1, .neurons = 2, .robust = false});
   game.H[0][0][0] = 50.0;  // x' = 50 x^2 + ... blows up
   game.x0[0][0] = 30.0;
   Simulation run(testing::toml_of(game));

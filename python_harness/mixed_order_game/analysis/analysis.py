@@ -1,0 +1,64 @@
+"""The analysis of a game file or an FMU, as a function."""
+
+import math
+import tempfile
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+
+from ..build import build_fmu, cached_fmu
+from ..errors import GameError
+from ..model import Value
+from .analyst import Analyst, Progress
+from .findings import Analysis
+from .game import AnalysedGame, game_from_tables, read_game, toml_text, without_square
+
+
+def analyse(
+    game: Path | str,
+    *,
+    changes: Mapping[str, Value] | None = None,
+    simulation: bool = True,
+    square: bool = True,
+    radius: float = 0.1,
+    progress: Progress | None = None,
+) -> Analysis:
+    """Analyse a game file (.toml) or an FMU (.fmu).
+
+    changes: start values in place of the FMU's own. simulation: run the FMU with the game's gains and with
+    the designed ones. square = False: the same game with the square terms of g removed. radius: lim sup of
+    |x - x*| that the designed gains are to guarantee, in the game's length unit. progress is called with
+    the name of a step and the part of it done.
+
+    Raises GameError, ModelError, BuildError, VariableError or SimulationError as reading, building and
+    running do; GameError if the game has no unique Nash equilibrium or radius is not positive.
+    """
+    if not (math.isfinite(radius) and radius > 0.0):
+        raise GameError(f"radius = {radius:g} is not positive")
+    with _opened(Path(game), changes, simulation=simulation, square=square) as (analysed, fmu):
+        return Analyst(analysed, fmu, changes or {}, radius, progress).analysis(Path(game))
+
+
+@contextmanager
+def _opened(
+    path: Path, changes: Mapping[str, Value] | None, *, simulation: bool, square: bool
+) -> Iterator[tuple[AnalysedGame, Path | None]]:
+    """The game and, where one is needed, its FMU."""
+    needs_fmu = simulation or bool(changes)
+    if square:
+        if path.suffix == ".fmu" or not needs_fmu:
+            yield read_game(path, changes), path if simulation else None
+            return
+        read_game(path)
+        fmu = cached_fmu(path)
+        yield read_game(fmu, changes), fmu if simulation else None
+        return
+    tables = without_square(read_game(path).tables)
+    if not needs_fmu:
+        yield game_from_tables(tables, path), None
+        return
+    with tempfile.TemporaryDirectory(prefix="mixed-order-game-") as folder:
+        derived = Path(folder) / "game.toml"
+        derived.write_text(toml_text(tables), encoding="utf-8")
+        fmu = build_fmu(derived, derived.with_suffix(".fmu"))
+        yield read_game(fmu, changes), fmu if simulation else None

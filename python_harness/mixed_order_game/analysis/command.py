@@ -1,0 +1,95 @@
+"""The command `mog analyse`: parses options and prints."""
+
+import json
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+HELP = "An FMU (.fmu), a game file (.toml) or the name of a shipped game; the paper's example when left out."
+
+
+def analyse(
+    game: Annotated[Path | None, typer.Argument(help=HELP, show_default=False)] = None,
+    settings: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="NAME=VALUE", help="Start value of a parameter; repeatable."),
+    ] = None,
+    simulation: Annotated[  # noqa: FBT002 - the signature is the options
+        bool, typer.Option("--simulation/--no-simulation", help="Compare the bounds with runs of the FMU.")
+    ] = True,
+    square: Annotated[  # noqa: FBT002
+        bool,
+        typer.Option("--square/--no-square", help="Keep or remove the square terms of the unknown dynamics."),
+    ] = True,
+    radius: Annotated[
+        float, typer.Option(help="Distance to the equilibrium that the designed gains guarantee.")
+    ] = 0.1,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,  # noqa: FBT002
+) -> None:
+    """Tell whether the gains suit the graph: thresholds of the theorems, exact spectrum, guaranteed radius.
+
+    Compares the theorems' bounds with the exact spectrum and with runs, names every hypothesis that fails,
+    and designs gains that meet them all.
+
+    [bold]Examples:[/bold]
+
+    mog analyse my_game.toml --no-simulation --json
+
+    mog analyse --no-square --radius 0.01 --set k3=100
+    """
+    from ..build import default_game, shipped_game
+    from .analysis import analyse as run_analysis
+    from .rendering import print_analysis
+
+    if game is None:
+        game = default_game()
+    elif not game.suffix and not game.exists():
+        game = shipped_game(str(game))
+    with _progress() as show:
+        found = run_analysis(
+            game,
+            changes=dict(_setting(text) for text in settings or []),
+            simulation=simulation,
+            square=square,
+            radius=radius,
+            progress=show,
+        )
+    if as_json:
+        typer.echo(json.dumps(found.to_dict(), indent=2))
+    else:
+        print_analysis(found)
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command to an application."""
+    app.command()(analyse)
+
+
+def _setting(text: str) -> tuple[str, float | bool]:
+    name, separator, value = text.partition("=")
+    if not (name.strip() and separator):
+        raise typer.BadParameter(f"NAME=VALUE expected, not {text!r}", param_hint="--set")
+    booleans = {"true": True, "false": False}
+    if value.strip().lower() in booleans:
+        return name.strip(), booleans[value.strip().lower()]
+    try:
+        return name.strip(), float(value)
+    except ValueError:
+        told = f"the value of {name.strip()} must be a number, true or false, not {value!r}"
+        raise typer.BadParameter(told, param_hint="--set") from None
+
+
+@contextmanager
+def _progress() -> Iterator[Callable[[str, float], None]]:
+    """A spinner on stderr that names the step; nothing when stderr is not a terminal."""
+    from rich.console import Console
+
+    console = Console(stderr=True)
+    if not console.is_terminal:
+        yield lambda _name, _part: None
+        return
+    with console.status("analysing") as status:
+        yield lambda name, _part: status.update(name)

@@ -1,0 +1,39 @@
+"""The matrix of the estimates, M = L (x) I + A_0 of the paper, by its N blocks."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+
+def laplacian(adjacency: FloatArray) -> FloatArray:
+    """L = diag(sum_j a_ij) - A, (N, N), of the adjacency matrix A (N, N)."""
+    return np.asarray(np.diag(adjacency.sum(axis=1)) - adjacency)
+
+
+def consensus_blocks(adjacency: FloatArray) -> FloatArray:
+    """The blocks L + diag(a_1j, ..., a_Nj), (N, N, N); block j governs all estimates of player j's action.
+
+    Sorting the entries y_ij by j instead of by i turns L (x) I + A_0 into the block diagonal matrix of
+    these, because (L (x) I) couples only estimates of the same player and A_0 is diagonal. So an N^2 x N^2
+    problem is N problems of size N.
+    """
+    return np.asarray(laplacian(adjacency) + np.array([np.diag(column) for column in adjacency.T]))
+
+
+def consensus_eigenvalues(adjacency: FloatArray) -> FloatArray:
+    """Eigenvalues of each block in increasing order, (N, N), row j for block j, in units of the edge weights.
+
+    Together they are the eigenvalues of L (x) I + A_0. All are positive exactly if every component of the
+    graph holds a neighbour of every player; for a connected graph (the paper's Assumption 2) they are.
+    """
+    return np.asarray(np.linalg.eigvalsh(consensus_blocks(adjacency)))
+
+
+def is_connected(adjacency: FloatArray) -> bool:
+    """Whether the graph with these edge weights (N, N) is connected (the paper's Assumption 2)."""
+    reached = np.zeros(len(adjacency), dtype=bool)
+    reached[0] = True
+    for _ in range(len(adjacency)):
+        reached |= adjacency[reached].any(axis=0)
+    return bool(reached.all())

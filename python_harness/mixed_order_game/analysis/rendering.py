@@ -1,0 +1,42 @@
+"""What `mog analyse` prints: one table per section, the hypotheses and the verdicts."""
+
+from collections.abc import Sequence
+
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from .findings import Analysis, Figure
+from .hypotheses import Hypothesis
+
+
+def print_analysis(analysis: Analysis, console: Console | None = None) -> None:
+    """Print an analysis on stdout or the console given."""
+    console = Console(highlight=False) if console is None else console
+    console.print(Text(analysis.title, style="bold"))
+    for section in dict.fromkeys(row.section for row in analysis.rows):
+        table = Table("figure", "value", "unit", "meaning", title=Text(section), title_justify="left")
+        for row in analysis.rows:
+            if row.section == section:
+                unit = "" if row.unit == "1" else row.unit
+                table.add_row(Text(row.name), Text(_plain(row.value)), unit, Text(row.meaning))
+        console.print(table)
+    console.print(_hypotheses("Theorem 1 for the given gains", analysis.hypotheses))
+    for each in analysis.demonstrations:
+        console.print(_hypotheses(f"Theorem 1 for the design by {each.name}", each.hypotheses))
+    for verdict in analysis.verdicts:
+        console.print(Text(f"- {verdict}"))
+
+
+def _hypotheses(title: str, hypotheses: Sequence[Hypothesis]) -> Table:
+    table = Table("", "hypothesis", "figures", title=Text(title), title_justify="left")
+    marks = {True: Text("holds", style="green"), False: Text("fails", style="bold red"), None: Text("open")}
+    for each in hypotheses:
+        table.add_row(marks[each.holds], Text(each.name), Text(each.figures))
+    return table
+
+
+def _plain(value: Figure) -> str:
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return value if isinstance(value, str) else f"{value:.5g}"

@@ -1,0 +1,154 @@
+"""The command `mog compare`: parses options and prints."""
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from .compare import Comparison
+    from .model import Value
+
+EXAMPLES = r"""Set runs side by side: settling time, overshoot, control energy, final error, events.
+
+    A game comes with its baselines: without the network (beta = 0), without phi (delta = 0), without both.
+
+    [bold]Examples:[/bold]
+
+    mog compare
+
+    mog compare my_game.toml --variant "high gain: k1=20, k4=100" --no-baselines --figure comparison.pdf
+
+    mog compare first.parquet second.parquet --json
+    """
+
+RESULTS = (".csv", ".parquet")
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command to an application."""
+    app.command(help=EXAMPLES)(compare)
+
+
+def compare(
+    sources: Annotated[
+        list[Path] | None,
+        typer.Argument(
+            help="FMUs (.fmu), game files (.toml) and results (.parquet, .csv); default the paper's example.",
+            show_default=False,
+        ),
+    ] = None,
+    variants: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--variant",
+            metavar="LABEL:NAME=VALUE,...",
+            help="Another run of every game, with other start values; repeatable.",
+        ),
+    ] = None,
+    settings: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="NAME=VALUE", help="Start value of all runs of games; repeatable."),
+    ] = None,
+    baselines: Annotated[  # noqa: FBT002 - the signature is the options
+        bool, typer.Option("--baselines/--no-baselines", help="Run every game without its parts, too.")
+    ] = True,
+    stop_time: Annotated[
+        float | None, typer.Option(help="End of the runs in s.", show_default="FMU's")
+    ] = None,
+    step: Annotated[float | None, typer.Option(help="Sampling in s.", show_default="FMU's")] = None,
+    tolerance: Annotated[
+        float | None, typer.Option(help="Relative tolerance of the integrator.", show_default="FMU's")
+    ] = None,
+    settle_time: Annotated[
+        float | None,
+        typer.Option(help="Time in s from which the final error is taken.", show_default="80 % of the run"),
+    ] = None,
+    band: Annotated[
+        float | None,
+        typer.Option(
+            help="Largest |x - x*| that counts as settled.", show_default="2 % of the first run's initial one"
+        ),
+    ] = None,
+    figure: Annotated[
+        Path | None, typer.Option(help="Draw the errors over time (.pdf, .svg, .png).", show_default=False)
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,  # noqa: FBT002
+) -> None:
+    """Set runs side by side."""
+    from .compare import Comparison, compare_results, load_results
+    from .compare import compare as run_variants
+    from .model import read_model
+    from .sweeping import Settings
+    from .sweeping.options import fmu_of, settings_of
+
+    fixed = settings_of(settings or [])
+    wanted = dict(_variant(text) for text in variants or [])
+    games: list[Path | None] = [path for path in sources or [] if path.suffix not in RESULTS]
+    files = [path for path in sources or [] if path.suffix in RESULTS]
+    if not files and not games:
+        games = [None]
+    if not games and (fixed or wanted):
+        raise typer.BadParameter("results are not run again", param_hint="--variant, --set")
+
+    runs = list(compare_results(load_results(files), band=band, settle_time=settle_time).runs)
+    for game in games:
+        fmu = fmu_of(game)
+        model = read_model(fmu)
+        first = next((run.metrics for run in runs if run.metrics is not None), None)
+        comparison = run_variants(
+            fmu,
+            wanted,
+            start_values=fixed,
+            baselines=baselines,
+            settings=Settings(
+                stop_time=model.stop_time if stop_time is None else stop_time,
+                step=model.step if step is None else step,
+                tolerance=model.tolerance if tolerance is None else tolerance,
+                settle_time=settle_time,
+                band=band if first is None else first.band,
+            ),
+        )
+        prefix = "" if game is None or len(games) + len(files) == 1 else f"{game.stem}: "
+        runs += [run.renamed(prefix + run.label) for run in comparison.runs]
+    found = Comparison(tuple(runs))
+    if as_json:
+        typer.echo(json.dumps(found.as_json(), indent=2))
+    else:
+        _print(found)
+    if figure is not None:
+        from .plot import plot_error, save_figure
+
+        typer.echo(save_figure(plot_error(found.results), figure), err=as_json)
+
+
+def _variant(text: str) -> "tuple[str, dict[str, Value]]":
+    from .names import split_names
+    from .sweeping.options import settings_of
+
+    label, separator, values = text.partition(":")
+    if not (label.strip() and separator):
+        raise typer.BadParameter(f"LABEL:NAME=VALUE,... expected, not {text!r}", param_hint="--variant")
+    return label.strip(), settings_of(split_names(values), "--variant")
+
+
+def _print(found: "Comparison") -> None:
+    from rich.box import SIMPLE_HEAD
+    from rich.console import Console
+    from rich.table import Column, Table
+    from rich.text import Text
+
+    from .metrics import METRIC_UNITS
+
+    console = Console(highlight=False)
+    table = Table(Column("run", no_wrap=True), box=SIMPLE_HEAD)
+    for name, unit in METRIC_UNITS.items():
+        table.add_column(name.replace("_", " ") + (f" ({unit})" if unit else ""))
+    for run in found.runs:
+        figures = [None if run.metrics is None else getattr(run.metrics, name) for name in METRIC_UNITS]
+        table.add_row(Text(run.label), *("-" if value is None else f"{value:.4g}" for value in figures))
+    console.print(table)
+    for run in found.runs:
+        if run.error:
+            console.print(Text(f"{run.label}: {run.error}"))

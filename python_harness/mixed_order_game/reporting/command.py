@@ -1,0 +1,70 @@
+"""The command `mog report`: parses options and prints."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command to the application."""
+    app.command("report")(report)
+
+
+def report(
+    source: Annotated[
+        Path | None,
+        typer.Argument(
+            help="An FMU, a game file, a game of the package by name, or a result (.parquet, .csv); "
+            "the paper's example when left out.",
+            show_default=False,
+        ),
+    ] = None,
+    output: Annotated[Path, typer.Option("--output", "-o", help="The page to write (.html).")] = Path(
+        "report.html"
+    ),
+    settings: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="NAME=VALUE", help="Start value of a parameter; repeatable."),
+    ] = None,
+    stop_time: Annotated[
+        float | None, typer.Option(help="End of the run in s.", show_default="FMU's")
+    ] = None,
+    claims: Annotated[  # noqa: FBT002 - the signature is the options
+        bool,
+        typer.Option("--claims/--no-claims", help="Judge the paper's claims, which takes three more runs."),
+    ] = True,
+) -> None:
+    r"""Write one HTML page about a game or a run: interactive figures, claims, parameters, provenance.
+
+    The page needs no network. It is written in any case; the exit code is 1 if a claim fails.
+
+    [bold]Examples:[/bold]
+
+    mog report my_game.toml --output my_game.html
+
+    mog report --set k3=10 --set "a\[1,3]=1" --output weak_consensus.html
+
+    mog run --output run.parquet
+    mog report run.parquet
+    """
+    from ..build import default_game
+    from ..sweeping.options import settings_of
+    from .page import report as write_report
+
+    if output.suffix != ".html":
+        raise typer.BadParameter("the file must end in .html", param_hint="--output")
+    changes = settings_of(settings or [])
+    done = write_report(
+        default_game() if source is None else source,
+        output,
+        changes=changes,
+        claims=claims,
+        stop_time=stop_time,
+    )
+    typer.echo(done.path)
+    validation = done.evidence.validation
+    if validation is not None and not validation.passed:
+        failed = [claim.name for claim in validation.claims if not claim.passed]
+        typer.echo(f"mog: {', '.join(failed)} failed", err=True)
+        raise typer.Exit(1)

@@ -1,0 +1,197 @@
+"""What a report is made from: runs of one game, the judged claims, and what is known of the unknown."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import ResultError
+from ..model import Model, Value
+from ..names import parse_name
+from ..parameters import GameParameters, game_parameters
+from ..results import Result
+from ..run import Simulator
+from ..spectrum import linear_loop, spectral_abscissa
+from ..validate import LARGEST_LINEAR_LOOP, PLAIN_TOLERANCE, TOLERANCE, Validation, validate
+
+FloatArray = NDArray[np.float64]
+
+MOST_ESTIMATING = 12
+"""Most players whose estimates, N^2 D signals, are recorded and drawn."""
+
+ON_SPHERE = 1e-9
+"""Relative distance of w'w from W_max within which a column counts as on the sphere."""
+
+
+STORED = (
+    "This page is made from a stored run: what needs the game itself, the claims, the predicted rate and the "
+    "unknown term, is left out."
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Evidence:
+    """One run and what belongs to it; what is None could not be had from the source."""
+
+    result: Result
+    model: Model | None = None
+    changes: Mapping[str, Value] | None = None
+    plain: Result | None = None  # the same game, neither perturbed nor robust
+    abscissa: float | None = None  # of the linear loop of that game, 1/s
+    unknown: FloatArray | None = None  # g_i(x) + d_i(t) + d_ext along the run, (T, N, D)
+    validation: Validation | None = None
+    notes: tuple[str, ...] = ()
+
+    @property
+    def passed(self) -> bool:
+        """Whether every claim that was judged holds."""
+        return self.validation is None or self.validation.passed
+
+
+def evidence_of_game(
+    fmu: Path | str,
+    *,
+    changes: Mapping[str, Value] | None = None,
+    claims: bool = True,
+    stop_time: float | None = None,
+    progress: Callable[[str, float], None] | None = None,
+) -> Evidence:
+    """Run an FMU as it stands and unperturbed, and judge its claims.
+
+    changes: start values in place of the FMU's own; the claims, which are about the game as it stands, are
+    then left out. stop_time in s. progress is called with the name of a run and the part of it done.
+    Raises what Simulator and validate raise.
+    """
+    notes: list[str] = []
+    with Simulator(fmu) as simulator:
+        model = simulator.model
+        stop = model.stop_time if stop_time is None else stop_time
+        game = game_parameters(model, changes)
+
+        def simulate(
+            name: str, settings: Mapping[str, Value], tolerance: float, *, estimates: bool
+        ) -> Result:
+            return simulator.run(
+                start_values=settings,
+                stop_time=stop,
+                step=model.step,
+                tolerance=tolerance,
+                outputs=_signals(model) if estimates else None,
+                progress=None if progress is None else lambda time: progress(name, time / stop),
+            )
+
+        estimates = bool(model.indexed("y")) and model.players <= MOST_ESTIMATING
+        result = simulate("run", changes or {}, TOLERANCE, estimates=estimates)
+        off = {**(changes or {}), "robust": False, "perturbed": False}
+        plain = simulate("unperturbed run", off, PLAIN_TOLERANCE, estimates=False)
+    abscissa = None
+    if game.players <= LARGEST_LINEAR_LOOP:
+        abscissa = spectral_abscissa(linear_loop(game))
+    else:
+        notes.append(f"No rate is predicted: the linear loop of {game.players} players is too large.")
+    if not estimates:
+        many = f"there are N^2 D of them, and N = {model.players} exceeds {MOST_ESTIMATING}"
+        why = many if model.players > MOST_ESTIMATING else "the FMU does not expose them"
+        notes.append(f"Estimates are not drawn one by one: {why}.")
+    validation = None
+    if changes:
+        notes.append("The claims are about the game as it stands; this run has changed parameters.")
+    elif claims:
+        validation = validate(fmu, progress=progress)
+    return Evidence(
+        result=result,
+        model=model,
+        changes=changes,
+        plain=plain,
+        abscissa=abscissa,
+        unknown=unknown_term(game, result),
+        validation=validation,
+        notes=tuple(notes),
+    )
+
+
+def evidence_of_result(result: Result) -> Evidence:
+    """A report of a stored run alone: no claims, no prediction, no unknown term."""
+    return Evidence(
+        result=result,
+        notes=(STORED,),
+    )
+
+
+def unknown_term(game: GameParameters, result: Result) -> FloatArray:
+    """g_i(x(t)) + d_i(t) + d_ext along a run whose parameters do not change, (T, N, D).
+
+    g_i(x)_l = sum_j (G_ij,l x_jl + H_ij,l x_jl^2), d_il(t) = bias + amplitude sin(frequency t + phase).
+    """
+    shape = (game.players, game.dimension)
+    unknown = np.broadcast_to(_parameter(result, "d_ext", shape), (len(result.time), *shape)).copy()
+    if not result.parameters.get("perturbed", True):
+        return unknown
+    x = result.x
+    unknown += np.einsum("ijl,tjl->til", game.dynamics_linear, x)
+    unknown += np.einsum("ijl,tjl->til", game.dynamics_square, x * x)
+    bias, amplitude, frequency, phase = (
+        _parameter(result, f"disturbance_{name}", shape)
+        for name in ("bias", "amplitude", "frequency", "phase")
+    )
+    time = result.time[:, np.newaxis, np.newaxis]
+    return np.asarray(unknown + bias + amplitude * np.sin(frequency * time + phase))
+
+
+def shared_signal(result: Result) -> FloatArray | None:
+    """xbar (T, N, D): z_i of order 1, x_i of order 2; None if z or x was not recorded."""
+    try:
+        return np.where(np.isnan(result.z), result.x, result.z)
+    except ResultError:
+        return None
+
+
+def weight_bound(result: Result) -> float | None:
+    """W_max of a run; None if its parameters are unknown."""
+    bound = result.parameters.get("W_max")
+    return None if bound is None else float(bound)
+
+
+def sphere_switches(result: Result) -> list[tuple[int, int, int, bool]]:
+    """Columns seen to reach or leave the sphere: (sample, player, coordinate, whether it enters), 0-based.
+
+    Only what shows between two samples; solver_events counts every switch.
+    """
+    bound = weight_bound(result)
+    if bound is None:
+        return []
+    on = result.W_norm2 >= bound * (1.0 - ON_SPHERE)
+    return [
+        (int(t) + 1, int(i), int(coordinate), bool(on[t + 1, i, coordinate]))
+        for t, i, coordinate in np.argwhere(on[1:] != on[:-1])
+    ]
+
+
+def energy_so_far(result: Result) -> FloatArray:
+    """Integral of |u_i|^2 from the start, (T, N), by the trapezoidal rule over the samples."""
+    power = np.sum(result.u**2, axis=2)
+    steps = 0.5 * (power[1:] + power[:-1]) * np.diff(result.time)[:, np.newaxis]
+    return np.vstack([np.zeros(power.shape[1]), np.cumsum(steps, axis=0)])
+
+
+def _signals(model: Model) -> list[str]:
+    """Every output and local, estimates included, weights and derivatives not."""
+    return [
+        variable.name
+        for variable in model.variables.values()
+        if variable.causality in ("output", "local")
+        and variable.variability != "constant"
+        and parse_name(variable.name)[0] != "W"
+        and not variable.name.startswith("der(")
+    ]
+
+
+def _parameter(result: Result, stem: str, shape: tuple[int, ...]) -> FloatArray:
+    values = np.zeros(shape)
+    for name, value in result.parameters.items():
+        each, index = parse_name(name)
+        if each == stem and index:
+            values[tuple(position - 1 for position in index)] = value
+    return values

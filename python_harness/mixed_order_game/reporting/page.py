@@ -1,0 +1,240 @@
+"""The page: evidence and figures in one HTML file that asks no network for anything."""
+
+import json
+import platform
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import GameError
+from ..metrics import SETTLED, changed_values, metrics
+from ..model import Value, provenance
+from ..names import parse_name
+from ..parameters import game_parameters
+from ..plot import edges_of
+from ..results import Result, load, write_whole
+from ..version import package_version
+from .evidence import Evidence, energy_so_far, evidence_of_game, evidence_of_result
+from .figures import figures
+
+TEMPLATE = "page.html.j2"
+LONGEST_LIST = 400
+"""Rows of a table of parameters; what exceeds them is counted."""
+
+
+@dataclass(frozen=True)
+class Report:
+    """A page that was written."""
+
+    path: Path
+    evidence: Evidence
+
+    @property
+    def passed(self) -> bool:
+        """Whether every claim that was judged holds."""
+        return self.evidence.passed
+
+
+def report(
+    source: Path | str,
+    output: Path | str,
+    *,
+    changes: Mapping[str, Value] | None = None,
+    claims: bool = True,
+    stop_time: float | None = None,
+    progress: Callable[[str, float], None] | None = None,
+) -> Report:
+    """Write the page of an FMU, a game file, a game of the package by name, or a stored result.
+
+    changes, claims, stop_time (s) and progress: as in evidence_of_game; a stored result takes none of them.
+    Raises what running, judging and loading raise; ResultError if the page cannot be written.
+    """
+    from ..build import cached_fmu, shipped_game
+
+    source, output = Path(source), Path(output)
+    if source.suffix in (".parquet", ".csv"):
+        if changes or stop_time is not None:
+            raise GameError(f"{source} is a stored run: it takes neither parameters nor a stop time")
+        evidence = evidence_of_result(load(source))
+    elif source.suffix in (".fmu", ".toml", ""):
+        game = source if source.suffix else shipped_game(str(source))
+        fmu = game if game.suffix == ".fmu" else cached_fmu(game)
+        evidence = evidence_of_game(
+            fmu, changes=changes, claims=claims, stop_time=stop_time, progress=progress
+        )
+    else:
+        raise GameError(
+            f"{source} is neither an FMU (.fmu), a game file (.toml) nor a result (.parquet, .csv)"
+        )
+    page = render_page(evidence)
+    write_whole(output, lambda file: file.write(page.encode()))
+    return Report(output, evidence)
+
+
+def render_page(evidence: Evidence) -> str:
+    """The HTML text; equal evidence gives equal text."""
+    import jinja2
+    from plotly.offline import get_plotlyjs
+
+    environment = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(Path(__file__).parent),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    drawn = list(figures(evidence))
+    return environment.get_template(TEMPLATE).render(
+        title=evidence.result.title or "Stored run",
+        plotly=get_plotlyjs(),
+        figures=drawn,
+        figure_data=_script_json({figure.name: figure.as_json() for figure in drawn}),
+        summary=_summary(evidence),
+        verdict=None if evidence.validation is None else evidence.validation,
+        notes=[*evidence.notes, *(() if evidence.validation is None else evidence.validation.notes)],
+        settings=_settings(evidence),
+        scalars=_scalars(evidence),
+        players=_players(evidence),
+        edges=[f"{i}-{j}" + (f" ({w:g})" if w != 1.0 else "") for i, j, w in edges_of(evidence.result)],
+        others=_others(evidence.result),
+        sources=() if evidence.model is None else provenance(evidence.model),
+        provenance=_provenance(evidence),
+        messages=evidence.result.messages,
+    )
+
+
+def _script_json(value: object) -> str:
+    """JSON that may stand inside a script element."""
+    text = json.dumps(value, separators=(",", ":"), allow_nan=False)
+    return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
+
+
+def _summary(evidence: Evidence) -> list[tuple[str, str]]:
+    """What is read first: name and figure."""
+    result = evidence.result
+    tiles = [
+        ("players", str(result.players)),
+        ("coordinates", str(result.dimension)),
+        ("duration", f"{result.time[-1] - result.time[0]:g} s"),
+    ]
+    found = metrics(result)
+    if "nash_error" in result.columns:
+        tiles.append(("|x - x*| at the end", f"{result.nash_error[-1]:.3g}"))
+    tiles += [
+        ("largest entry of x - x*, last fifth", f"{found.final_error:.3g}"),
+        (f"settled to {SETTLED:.0%} after", _finite(found.settling_time, " s", "not settled")),
+        ("overshoot", _finite(100.0 * found.overshoot, " %", "none")),
+    ]
+    if evidence.abscissa is not None:
+        tiles.append(("predicted rate, unperturbed", f"{-evidence.abscissa:.4g} 1/s"))
+    if not np.isnan(found.control_energy):
+        tiles.append(("control energy", f"{found.control_energy:.4g}"))
+    if not np.isnan(found.events):
+        tiles.append(("sphere events", f"{found.events:.0f}"))
+    return tiles
+
+
+def _finite(value: float, unit: str, otherwise: str) -> str:
+    return f"{value:.3g}{unit}" if np.isfinite(value) else otherwise
+
+
+def _settings(evidence: Evidence) -> list[tuple[str, str, str]]:
+    """Parameters that differ from the FMU's start values: name, value, start value."""
+    model, result = evidence.model, evidence.result
+    if model is None:
+        return []
+    return [
+        (name, _number(value), _number(model.variable(name).start))
+        for name, value in changed_values(model, result.parameters).items()
+    ]
+
+
+def _scalars(evidence: Evidence) -> list[tuple[str, str, str, str]]:
+    """Parameters without an index: name, value, unit, meaning."""
+    rows = []
+    for name, value in evidence.result.parameters.items():
+        if parse_name(name)[1]:
+            continue
+        variable = None if evidence.model is None else evidence.model.variables.get(name)
+        unit = (variable.unit if variable else None) or evidence.result.units.get(name, "")
+        rows.append(
+            (name, _number(value), "" if unit == "1" else unit, variable.description if variable else "")
+        )
+    return rows
+
+
+def _players(evidence: Evidence) -> list[dict[str, str]]:
+    """One row a player: order, cost, start, equilibrium, end."""
+    model, result = evidence.model, evidence.result
+    if model is None:
+        return []
+    game = game_parameters(model, evidence.changes)
+    energy = energy_so_far(result)[-1]
+    rows = []
+    for i in range(min(game.players, LONGEST_LIST)):
+        coupling = game.cost_coupling[i]
+        rows.append(
+            {
+                "player": f"{i + 1}: {model.player_names[i]}",
+                "order": str(model.order[i]),
+                "quadratic": _number(game.cost_quadratic[i]),
+                "linear": _list(game.cost_linear[i]),
+                "coupling": ", ".join(f"{j + 1}: {coupling[j]:g}" for j in np.flatnonzero(coupling)),
+                "x0": _list(game.x0[i]),
+                "x_star": _list(result.x_star[i]),
+                "end": _list(result.x[-1, i]),
+                "energy": f"{energy[i]:.4g}",
+            }
+        )
+    return rows
+
+
+def _others(result: Result) -> list[tuple[str, str]]:
+    """Indexed parameters that are not zero, for the record."""
+    rows = [
+        (name, _number(value)) for name, value in result.parameters.items() if parse_name(name)[1] and value
+    ]
+    if len(rows) > LONGEST_LIST:
+        rows = [*rows[:LONGEST_LIST], ("...", f"and {len(rows) - LONGEST_LIST} more")]
+    return rows
+
+
+def _provenance(evidence: Evidence) -> list[tuple[str, str]]:
+    result, model = evidence.result, evidence.model
+    rows = [
+        ("run by", f"mixed-order-game {result.package_version}" if result.package_version else "unknown"),
+        ("page by", f"mixed-order-game {package_version()}"),
+        ("FMU's GUID", result.guid or "unknown"),
+    ]
+    if model is not None:
+        rows += [
+            ("FMU", model.path.name),
+            ("FMU made by", model.generation_tool),
+            ("FMI version", model.fmi_version),
+        ]
+    rows += [
+        ("step", f"{result.step:g} s"),
+        ("relative tolerance", f"{result.tolerance:g}"),
+        ("Python", platform.python_version()),
+        ("platform", f"{platform.system()} {platform.machine()}"),
+    ]
+    for package in ("fmpy", "numpy", "plotly"):
+        try:
+            rows.append((package, version(package)))
+        except PackageNotFoundError:
+            continue
+    return rows
+
+
+def _number(value: Any) -> str:
+    if isinstance(value, bool | np.bool_):
+        return "true" if value else "false"
+    return f"{float(value):.10g}"
+
+
+def _list(values: Any) -> str:
+    return ", ".join(f"{value:.5g}" for value in values)

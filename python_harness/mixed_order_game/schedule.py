@@ -1,0 +1,301 @@
+"""Switching graphs and external disturbances from files: edges a[i,j] and inputs d_ext[i,l] over time.
+
+A schedule of graphs is a TOML file with whole graphs or a CSV file with edge weights; disturbances are a CSV
+file. Names in CSV headers contain commas and stand in double quotes; the csv module reads and writes them.
+"""
+
+import csv
+import tomllib
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+from typing import IO, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .errors import MixedOrderGameError
+from .graphs import CommunicationGraph, edge_values, graphs_of_text
+from .model import Model, Value, check_value
+from .names import parse_name
+from .results import write_whole
+
+FloatArray = NDArray[np.float64]
+
+LARGEST_ENTRIES = 1_000_000
+"""Most entries of a schedule, repetitions included."""
+
+TIME = "time"
+
+
+class ScheduleError(MixedOrderGameError):
+    """A schedule or disturbance file that cannot be read or does not fit the game."""
+
+
+@dataclass(frozen=True)
+class GraphSchedule:
+    """Edge weights to set at times, in s; a period repeats them. Weights by the FMU's names a[i,j].
+
+    Before the first time the FMU's own graph is in force.
+    """
+
+    entries: tuple[tuple[float, Mapping[str, float]], ...]
+    period: float | None = None
+
+    def __post_init__(self) -> None:
+        times = [time for time, _ in self.entries]
+        if not times:
+            raise ScheduleError("the schedule names no graph")
+        if not all(np.isfinite(times)) or any(b <= a for a, b in pairwise(times)):
+            raise ScheduleError("the times of the schedule do not go up")
+        if self.period is not None and not (np.isfinite(self.period) and self.period > times[-1] - times[0]):
+            raise ScheduleError(f"the period {self.period:g} s is not longer than the schedule")
+
+    def start_values(self, start_time: float = 0.0) -> dict[str, Value]:
+        """Edge weights in force at the beginning of the run, for start_values of a run; may be empty."""
+        values: dict[str, Value] = {}
+        for time, weights in self._until(start_time):
+            if time <= start_time:
+                values |= weights
+        return values
+
+    def changes(self, stop_time: float, start_time: float = 0.0) -> dict[float, dict[str, Value]]:
+        """What is set between start and stop, for changes of a run."""
+        return {
+            time: dict(weights) for time, weights in self._until(stop_time) if start_time < time < stop_time
+        }
+
+    def _until(self, stop: float) -> Iterable[tuple[float, Mapping[str, float]]]:
+        if self.period is None:
+            yield from self.entries
+            return
+        first = self.entries[0][0]
+        repetitions = max(0, int((stop - first) / self.period)) + 1
+        if repetitions * len(self.entries) > LARGEST_ENTRIES:
+            raise ScheduleError(f"the period {self.period:g} s gives more than {LARGEST_ENTRIES} graphs")
+        for k in range(repetitions):
+            for time, weights in self.entries:
+                yield time + k * self.period, weights
+
+
+def graph_schedule(
+    model: Model, graphs: Mapping[float, CommunicationGraph], *, period: float | None = None
+) -> GraphSchedule:
+    """A schedule of whole graphs by their time in s. Raises GraphError for a graph the game cannot take."""
+    entries = tuple((float(time), graphs[time].start_values(model)) for time in sorted(graphs))
+    return GraphSchedule(entries, period)
+
+
+def read_graph_schedule(path: Path | str, model: Model) -> GraphSchedule:
+    """Read a schedule of graphs, .toml or .csv, for a game.
+
+    TOML: a table [[graph]] per switch with time in s and either edges = [[1, 2], [2, 3, 0.5]] or a kind such
+    as graph = "ring" (see graphs.GRAPHS_HELP); optional period in s.
+    CSV: the column time in s and columns a[i,j]; an empty cell keeps the weight, as does an edge without a
+    column.
+    Raises ScheduleError naming the file.
+    """
+    path = Path(path)
+    readers = {".toml": _read_toml, ".csv": _read_edges}
+    if path.suffix not in readers:
+        raise ScheduleError(f"{path} must end in .toml or .csv")
+    try:
+        return readers[path.suffix](path, model)
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError, csv.Error) as error:
+        raise ScheduleError(f"{path} cannot be read: {error}") from error
+    except MixedOrderGameError as error:
+        raise ScheduleError(f"{path}: {error}") from error
+
+
+def _read_toml(path: Path, model: Model) -> GraphSchedule:
+    data = tomllib.loads(path.read_text(encoding="utf-8"))
+    _known(data, {"graph", "period"}, "the schedule")
+    tables = data.get("graph")
+    if not isinstance(tables, list) or not tables or not all(isinstance(each, dict) for each in tables):
+        raise ScheduleError("a table [[graph]] for every switch expected")
+    entries = []
+    for number, table in enumerate(tables, start=1):
+        where = f"graph {number}"
+        _known(table, {"time", "edges", "graph"}, where)
+        time = _number(table.get("time"), f"the time of {where}")
+        if ("edges" in table) == ("graph" in table):
+            raise ScheduleError(f"{where} needs either edges or graph")
+        if "edges" in table:
+            weights = edge_values(model, _edges(table["edges"], model.players, where))
+        else:
+            chosen = graphs_of_text(str(table["graph"]), model.players)
+            if len(chosen) != 1:
+                raise ScheduleError(f"{where} = {table['graph']!r} stands for {len(chosen)} graphs")
+            weights = chosen[0].start_values(model)
+        entries.append((time, weights))
+    period = None if "period" not in data else _number(data["period"], "the period")
+    return GraphSchedule(tuple(entries), period)
+
+
+def _edges(edges: Any, players: int, where: str) -> dict[tuple[int, ...], float]:
+    weights: dict[tuple[int, ...], float] = {}
+    if not isinstance(edges, list) or not all(
+        isinstance(each, list) and len(each) in (2, 3) for each in edges
+    ):
+        raise ScheduleError(f"the edges of {where} are not a list of [i, j] and [i, j, weight]")
+    for edge in edges:
+        if not all(isinstance(end, int) and not isinstance(end, bool) for end in edge[:2]):
+            raise ScheduleError(f"{edge} of {where} does not begin with two players")
+        i, j = sorted(edge[:2])
+        weight = _number(edge[2], f"the weight of {i}-{j}") if len(edge) > 2 else 1.0  # noqa: PLR2004 - [i, j, w]
+        if not 1 <= i < j <= players or weight < 0.0 or (i, j) in weights:
+            raise ScheduleError(f"{edge} of {where} is no new edge of {players} players with a weight >= 0")
+        weights[i, j] = weight
+    return weights
+
+
+def _read_edges(path: Path, model: Model) -> GraphSchedule:
+    names, rows = _read_table(path)
+    for name in names:
+        if parse_name(name)[0] != "a":
+            raise ScheduleError(f'the column {name} is not an edge such as "a[1,2]"')
+        model.variable(name)
+    entries = []
+    for time, cells in rows:
+        weights = {name: cell for name, cell in zip(names, cells, strict=True) if not np.isnan(cell)}
+        for name, weight in weights.items():
+            check_value(model.variable(name), weight, during_run=True)
+        entries.append((time, weights))
+    return GraphSchedule(tuple(entries))
+
+
+@dataclass(frozen=True, eq=False)
+class Disturbance:
+    """External disturbance d_ext over time, to be given as inputs to a run: a function of the time in s.
+
+    Between two rows it holds the earlier one, or goes straight if linear. 0 before the first row; the last
+    row holds on.
+    """
+
+    time: FloatArray  # (T,), s, going up
+    values: FloatArray  # (T, N, D)
+    linear: bool = False
+
+    def __call__(self, time: float) -> FloatArray:
+        """d_ext (N, D) at a time."""
+        slack = 1e-9 * (1.0 + abs(time))  # a communication point that rounding put before its row
+        row = int(np.searchsorted(self.time, time + slack, side="right")) - 1
+        if row < 0:
+            return np.zeros(self.values.shape[1:])
+        if not self.linear or row == len(self.time) - 1:
+            return np.asarray(self.values[row])
+        part = max(0.0, (time - self.time[row]) / (self.time[row + 1] - self.time[row]))
+        return np.asarray((1.0 - part) * self.values[row] + part * self.values[row + 1])
+
+
+def read_disturbance(path: Path | str, model: Model, *, linear: bool = False) -> Disturbance:
+    """Read d_ext for a game from a CSV file: the column time in s and columns d_ext[i,l].
+
+    Inputs without a column are 0. Raises ScheduleError naming the file.
+    """
+    path = Path(path)
+    if path.suffix != ".csv":
+        raise ScheduleError(f"{path} must end in .csv")
+    try:
+        return _disturbance(path, model, linear=linear)
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise ScheduleError(f"{path} cannot be read: {error}") from error
+    except ScheduleError as error:
+        raise ScheduleError(f"{path}: {error}") from error
+
+
+def _disturbance(path: Path, model: Model, *, linear: bool) -> Disturbance:
+    names, rows = _read_table(path)
+    inputs = {variable.name: index for index, variable in model.indexed("d_ext").items()}
+    values = np.zeros((len(rows), model.players, model.dimension))
+    for column, name in enumerate(names):
+        if name not in inputs:
+            raise ScheduleError(f'{name} is not an external disturbance of the game such as "d_ext[1,2]"')
+        i, k = inputs[name]
+        values[:, i - 1, k - 1] = [cells[column] for _, cells in rows]
+    if np.isnan(values).any():
+        raise ScheduleError("a cell is empty")
+    return Disturbance(np.array([time for time, _ in rows]), values, linear)
+
+
+def write_disturbance(path: Path | str, time: ArrayLike, values: ArrayLike) -> Path:
+    """Write d_ext, time (T,) in s and values (T, N, D), as the CSV file that read_disturbance reads."""
+    times, array = np.asarray(time, dtype=np.float64), np.asarray(values, dtype=np.float64)
+    if times.ndim != 1 or array.ndim != 3 or len(array) != len(times):  # noqa: PLR2004 - (T, N, D)
+        raise ScheduleError(f"time {times.shape} and values {array.shape} are not (T,) and (T, N, D)")
+    _, players, dimension = array.shape
+    names = [f"d_ext[{i},{k}]" for i in range(1, players + 1) for k in range(1, dimension + 1)]
+    rows = np.column_stack([times, array.reshape(len(times), -1)])
+    return _write_table(Path(path), names, rows.tolist())
+
+
+def write_graph_schedule(path: Path | str, schedule: GraphSchedule) -> Path:
+    """Write a schedule without period as the CSV file that read_graph_schedule reads."""
+    if schedule.period is not None:
+        raise ScheduleError("a CSV file holds no period: write the entries of one run, or TOML")
+    names = list(dict.fromkeys(name for _, weights in schedule.entries for name in weights))
+    rows = [[time, *(weights.get(name, "") for name in names)] for time, weights in schedule.entries]
+    return _write_table(Path(path), names, rows)
+
+
+def _read_table(path: Path) -> tuple[list[str], list[tuple[float, list[float]]]]:
+    """Names of the columns but time, and rows (time, cells); NaN for an empty cell."""
+    with path.open(encoding="utf-8-sig", newline="") as file:
+        lines = [line for line in csv.reader(file, strict=True) if line]
+    header, body = ([name.strip() for name in lines[0]], lines[1:]) if lines else ([], [])
+    cut = next((name for name in header if name.count("[") != name.count("]")), None)
+    if cut is not None:
+        raise ScheduleError(f"the name {cut} is cut at its comma: names stand in double quotes")
+    if header[:1] != [TIME] or len(set(header)) != len(header):
+        raise ScheduleError(
+            "the first line must name time and then every variable once, names in double quotes"
+        )
+    if not body:
+        raise ScheduleError("there are no rows below the header")
+    rows: list[tuple[float, list[float]]] = []
+    for number, line in enumerate(body, start=2):
+        if len(line) != len(header):
+            raise ScheduleError(f"row {number} has {len(line)} cells, the header has {len(header)}")
+        cells = [float("nan") if not cell.strip() else _cell(cell, number) for cell in line]
+        if np.isnan(cells[0]) or (rows and cells[0] <= rows[-1][0]):
+            raise ScheduleError(f"the times do not go up at row {number}")
+        rows.append((cells[0], cells[1:]))
+    return header[1:], rows
+
+
+def _write_table(path: Path, names: Sequence[str], rows: Iterable[Sequence[object]]) -> Path:
+    import io
+
+    def write(file: IO[bytes]) -> None:
+        text = io.TextIOWrapper(file, encoding="utf-8", newline="")
+        writer = csv.writer(text, quoting=csv.QUOTE_NONNUMERIC, lineterminator="\n")
+        writer.writerow([TIME, *names])
+        csv.writer(text, lineterminator="\n").writerows(rows)
+        text.flush()
+        text.detach()
+
+    write_whole(path, write)
+    return path
+
+
+def _cell(text: str, row: int) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        raise ScheduleError(f"row {row}: {text!r} is not a number") from None
+    if not np.isfinite(value):
+        raise ScheduleError(f"row {row}: {text!r} is not finite")
+    return value
+
+
+def _number(value: object, what: str) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not np.isfinite(value):
+        raise ScheduleError(f"{what} must be a number, not {value!r}")
+    return float(value)
+
+
+def _known(table: Mapping[str, Any], keys: set[str], where: str) -> None:
+    unknown = sorted(table.keys() - keys)
+    if unknown:
+        raise ScheduleError(f"{where} has an unknown key {unknown[0]}")

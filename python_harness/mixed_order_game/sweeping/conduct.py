@@ -1,0 +1,76 @@
+"""Carries a sweep out: opens the folder, runs what is not finished, writes rows as they come, joins them."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+from ..bounds import bounds
+from ..graphs import all_connected
+from ..model import Value, read_model
+from ..parameters import game_parameters
+from .definition import Sweep
+from .pool import Work, open_pool, run_cases, run_chunk
+from .sampler import Settings
+from .store import Store, locked
+from .table import SweepResult, load_sweep
+
+SweepProgress = Callable[[int, int], None]
+"""Called with the rows finished and the rows of the sweep, first with those of an earlier start."""
+
+
+def sweep(
+    definition: Sweep,
+    output: Path | str,
+    *,
+    jobs: int | None = None,
+    scheduler: str | None = None,
+    restart: bool = False,
+    progress: SweepProgress | None = None,
+    work: Work = run_chunk,
+) -> SweepResult:
+    """Run a sweep into the folder output and give its table.
+
+    Rows that the folder holds already are not run again, unless restart discards them.
+    jobs: processes on this machine; default one a usable core. Worker processes import the calling script:
+    keep the call below `if __name__ == "__main__":` there.
+    scheduler: address of a Dask scheduler, such as tcp://127.0.0.1:8786, whose workers run the rows instead.
+    work: what a worker does with a chunk of rows, a function that it can import.
+    Raises SweepError for a folder with other contents, PoolError for workers that cannot be had.
+    """
+    output = Path(output)
+    with locked(output):
+        store = Store(output, definition, restart=restart)
+        finished = store.finished()
+        cases = [definition.case(row) for row in range(definition.rows) if row not in finished]
+        done = definition.rows - len(cases)
+        if progress is not None:
+            progress(done, definition.rows)
+        if cases:
+            pool = open_pool(Path(definition.fmu), jobs=jobs, scheduler=scheduler, work=work)
+            try:
+                for outcomes in run_cases(pool, definition.settings, cases):
+                    store.append(outcomes)
+                    done += len(outcomes)
+                    if progress is not None:
+                        progress(done, definition.rows)
+            finally:
+                pool.close()
+        store.join()
+    return load_sweep(output)
+
+
+def connected_graphs_example(fmu: Path | str) -> Sweep:
+    """The built-in example: every connected graph on the game's players, robust and perturbed.
+
+    No run may leave the neighbourhood that the claims about the game allow: for the paper's example 0.00125
+    from 16 s on, over 728 graphs.
+    """
+    model = read_model(fmu)
+    switched: dict[str, Value] = {"robust": True, "perturbed": True}
+    allowed = bounds(model, game_parameters(model, switched))
+    return Sweep(
+        fmu=Path(fmu),
+        fixed=switched,
+        graphs=tuple(all_connected(model.players)),
+        settings=Settings(stop_time=model.stop_time, step=model.step, settle_time=allowed.settle_time),
+        neighbourhood=allowed.neighbourhood,
+    )

@@ -1,0 +1,126 @@
+"""What the commands sweep, tune and compare share: reading options, progress with the time left."""
+
+import time
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TypeVar
+
+import typer
+
+from ..build import cached_fmu, default_fmu
+from ..designs import DesignError, Range, range_of_text
+from ..errors import GameError
+from ..graphs import CommunicationGraph, GraphError, graph_of_model, graphs_of_text
+from ..model import Model, Value
+from ..names import split_names
+
+Parsed = TypeVar("Parsed")
+
+LINE_EVERY = 10.0
+"""Time in s between lines of progress when stderr is not a terminal."""
+
+
+def fmu_of(game: Path | None) -> Path:
+    """The FMU meant by an argument; a game file is made into one, kept in the user's cache."""
+    if game is None:
+        return default_fmu()
+    if game.suffix == ".fmu":
+        return game
+    if game.suffix == ".toml":
+        return cached_fmu(game)
+    raise GameError(f"{game} is neither an FMU (.fmu) nor a game file (.toml)")
+
+
+def settings_of(texts: Iterable[str], hint: str = "--set") -> dict[str, Value]:
+    """NAME=VALUE, each name once."""
+    return pairs_of(texts, _value, hint)
+
+
+def pairs_of(texts: Iterable[str], parse: Callable[[str], Parsed], hint: str) -> dict[str, Parsed]:
+    """NAME=TEXT, each name once, its text parsed. Raises typer.BadParameter."""
+    pairs: dict[str, Parsed] = {}
+    for text in texts:
+        name, separator, rest = (part.strip() for part in text.partition("="))
+        if not (name and separator and rest):
+            raise typer.BadParameter(f"NAME=... expected, not {text!r}", param_hint=hint)
+        if name in pairs:
+            raise typer.BadParameter(f"{name} is given twice", param_hint=hint)
+        try:
+            pairs[name] = parse(rest)
+        except (DesignError, ValueError) as error:
+            raise typer.BadParameter(f"{name}: {error}", param_hint=hint) from None
+    return pairs
+
+
+def range_option(text: str | None, hint: str) -> Range | None:
+    """LOW:HIGH. Raises typer.BadParameter."""
+    try:
+        return None if text is None else range_of_text(text)
+    except DesignError as error:
+        raise typer.BadParameter(str(error), param_hint=hint) from None
+
+
+def graphs_option(texts: Sequence[str], model: Model, seed: int) -> tuple[CommunicationGraph, ...]:
+    """Graphs of all texts in turn, each once. Raises typer.BadParameter."""
+    graphs: dict[CommunicationGraph, None] = {}
+    for text in texts:
+        try:
+            found = graphs_of_text(text, model.players, seed=seed, own=graph_of_model(model))
+        except GraphError as error:
+            raise typer.BadParameter(str(error), param_hint="--graphs") from None
+        graphs |= dict.fromkeys(found)
+    return tuple(graphs)
+
+
+def names_option(texts: Iterable[str]) -> list[str]:
+    """Comma-separated names of all texts."""
+    return [name for text in texts for name in split_names(text)]
+
+
+def _value(text: str) -> Value:
+    booleans = {"true": True, "false": False}
+    if text.lower() in booleans:
+        return booleans[text.lower()]
+    try:
+        return float(text)
+    except ValueError:
+        raise ValueError(f"a number, true or false expected, not {text!r}") from None
+
+
+@contextmanager
+def counted_progress(what: str) -> Iterator[Callable[[int, int], None]]:
+    """Runs done of all with the time left, on stderr: a bar on a terminal, elsewhere a line now and then."""
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    console = Console(stderr=True)
+    if not console.is_terminal:
+        yield _lines(what)
+        return
+    columns = (
+        TextColumn(what),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeRemainingColumn(elapsed_when_finished=True),
+    )
+    with Progress(*columns, console=console, transient=True) as bars:
+        task = bars.add_task(what, total=None)
+        yield lambda done, total: bars.update(task, completed=done, total=total)
+
+
+def _lines(what: str) -> Callable[[int, int], None]:
+    first: list[tuple[float, int]] = []
+    told = [time.monotonic()]
+
+    def show(done: int, total: int) -> None:
+        now = time.monotonic()
+        if not first:
+            first.append((now, done))
+        begin, before = first[0]
+        if now - told[0] >= LINE_EVERY and done > before:
+            told[0] = now
+            left = (now - begin) / (done - before) * (total - done)
+            typer.echo(f"{what}: {done} of {total}, {left:.0f} s left", err=True)
+
+    return show

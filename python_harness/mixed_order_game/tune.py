@@ -1,0 +1,483 @@
+"""Gains that settle in a wished time with little control energy, on one graph or on all graphs of a set.
+
+First the loop of Theorem 2 alone, which is linear: its settling time by the matrix exponential and its
+control energy by a Lyapunov equation cost milliseconds, and SciPy's differential evolution searches there.
+Then the real loop, through the FMU: the wish is tightened until every graph's run meets it, and a few dozen
+runs of Nelder and Mead's simplex lower the energy further. What is returned was simulated on every graph.
+"""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .designs import Range
+from .errors import MixedOrderGameError, SimulationError
+from .graphs import CommunicationGraph, graph_of
+from .metrics import SETTLED, Metrics
+from .model import Value, check_value
+from .parameters import GameParameters, game_parameters
+from .spectrum import initial_deviation, linear_loop, spectral_abscissa
+from .sweeping.pool import Case, open_pool, run_cases
+from .sweeping.sampler import Sampler, Settings
+
+FloatArray = NDArray[np.float64]
+
+LINEAR_GAINS = ("k1", "k2", "k3", "k4")
+"""Gains that the linear loop knows; others, such as delta, are tuned by simulation alone."""
+
+DEFAULT_RANGES: Mapping[str, Range] = {
+    "k1": Range(0.5, 100.0, logarithmic=True),
+    "k2": Range(0.1, 20.0, logarithmic=True),
+    "k3": Range(1.0, 500.0, logarithmic=True),
+    "k4": Range(1.0, 500.0, logarithmic=True),
+    "delta": Range(0.1, 100.0, logarithmic=True),
+    "beta": Range(1.0, 1000.0, logarithmic=True),
+    "epsilon": Range(0.001, 1.0, logarithmic=True),
+}
+"""Where gains are sought unless told otherwise; k1 to k4 in 1/s."""
+
+ROUNDS = 8
+POLISH_RUNS = 60
+HARDEST = 4
+"""Graphs that the first stage keeps in view at most; all are checked after it."""
+
+WINDOW = 40
+STEPS = 100
+SLACK = 0.02
+LARGEST_DENSE = 200
+"""States of a coordinate's loop up to which dense matrices are used: 13 players have 195."""
+
+UNSTABLE = 1e3
+MISSED = 30.0
+"""Weight of log(error / band) at the wished time against the logarithm of the energy."""
+
+TIGHTENING = 0.95
+LEAST_TARGET = 0.05
+
+
+class TuneError(MixedOrderGameError):
+    """A wish that makes no sense."""
+
+
+@dataclass(frozen=True)
+class Tuned:
+    """Gains found and the runs that prove them. met is false if no gains in the ranges were found to do."""
+
+    gains: Mapping[str, float]
+    met: bool
+    wish: float  # s
+    graphs: tuple[CommunicationGraph, ...]
+    metrics: tuple[Metrics | None, ...]  # one a graph, by simulation; None where the FMU gave up
+    start_gains: Mapping[str, float]  # what the game came with
+    start_metrics: tuple[Metrics | None, ...]
+    slowest_rate: float  # 1/s, smallest over the graphs: minus the spectral abscissa of the linear loop
+    simulations: int = field(default=0)
+
+    @property
+    def worst(self) -> int:
+        """Index of the graph that settles last; one that does not settle comes before all."""
+        return int(np.argmax([_settling(found) for found in self.metrics]))
+
+    @property
+    def settling_time(self) -> float:
+        """Longest settling time over the graphs in s; infinite if one does not settle."""
+        return max(_settling(found) for found in self.metrics)
+
+    @property
+    def control_energy(self) -> float:
+        """Largest integral of |u|^2 over the graphs."""
+        return _largest_energy(self.metrics)
+
+    def as_json(self) -> dict[str, Any]:
+        """Plain values for json.dumps."""
+        worst, before = self.metrics[self.worst], self.start_metrics[self.worst]
+        return {
+            "gains": dict(self.gains),
+            "met": self.met,
+            "wish": self.wish,
+            "settling_time": self.settling_time if np.isfinite(self.settling_time) else None,
+            "control_energy": self.control_energy if np.isfinite(self.control_energy) else None,
+            "slowest_rate": self.slowest_rate,
+            "graphs": len(self.graphs),
+            "simulations": self.simulations,
+            "worst_graph": self.graphs[self.worst].label,
+            "metrics": None if worst is None else worst.as_json(),
+            "start_gains": dict(self.start_gains),
+            "start_metrics": None if before is None else before.as_json(),
+        }
+
+
+Progress = Callable[[str, float], None]
+"""Called with what is being done and the part of it done, 0 to 1."""
+
+
+def tune(
+    fmu: Path | str,
+    settling_time: float,
+    *,
+    graphs: Sequence[CommunicationGraph] | None = None,
+    gains: Sequence[str] = LINEAR_GAINS,
+    ranges: Mapping[str, Range] | None = None,
+    start_values: Mapping[str, Value] | None = None,
+    band: float | None = None,
+    stop_time: float | None = None,
+    seed: int = 0,
+    jobs: int | None = 1,
+    progress: Progress | None = None,
+) -> Tuned:
+    """Seek gains so that the largest |x - x*| settles within settling_time, in s, on every graph.
+
+    graphs: default the game's own. gains: names to tune, in ranges (default DEFAULT_RANGES).
+    band: what settled means; default 2 % of the largest initial |x - x*|.
+    stop_time: length of the runs that verify, in s; default four times settling_time, at least 2 s.
+    jobs: processes that simulate many graphs; a script that asks for several guards its main module.
+    Raises TuneError for a wish without sense, VariableError for gains and values that the FMU does not take,
+    GraphError for graphs that it does not take.
+    """
+    if not (np.isfinite(settling_time) and settling_time > 0.0):
+        raise TuneError(f"the settling time {settling_time:g} s is not positive")
+    stop = max(2.0, 4.0 * settling_time) if stop_time is None else stop_time
+    if stop <= settling_time:
+        raise TuneError(f"runs of {stop:g} s cannot show that {settling_time:g} s are met")
+    with _Search(
+        fmu, settling_time, graphs, gains, ranges or {}, start_values or {}, band, stop, jobs
+    ) as search:
+        return search.run(seed, progress or (lambda _name, _part: None))
+
+
+class _Search:
+    """The game, the graphs and the ranges of one search; gains are vectors of logarithms in the box."""
+
+    def __init__(
+        self,
+        fmu: Path | str,
+        wish: float,
+        graphs: Sequence[CommunicationGraph] | None,
+        gains: Sequence[str],
+        ranges: Mapping[str, Range],
+        start_values: Mapping[str, Value],
+        band: float | None,
+        stop: float,
+        jobs: int | None,
+    ) -> None:
+        self.settings = Settings(stop_time=stop, band=band)
+        self.wish = wish
+        self.jobs = jobs
+        self.fixed = dict(start_values)
+        self.names = tuple(gains)
+        self.simulations = 0
+        self.sampler = Sampler(fmu)
+        try:
+            self._prepare(graphs, ranges, band)
+        except BaseException:
+            self.sampler.close()
+            raise
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.sampler.close()
+
+    def _prepare(
+        self, graphs: Sequence[CommunicationGraph] | None, ranges: Mapping[str, Range], band: float | None
+    ) -> None:
+        model = self.sampler.model
+        if not self.names or len(set(self.names)) != len(self.names):
+            raise TuneError("name every gain to tune once")
+        unknown = [name for name in (*self.names, *ranges) if name not in DEFAULT_RANGES]
+        if unknown:
+            raise TuneError(f"{unknown[0]} is not a gain: one of {', '.join(DEFAULT_RANGES)} expected")
+        clash = [name for name in self.names if name in self.fixed]
+        if clash:
+            raise TuneError(f"{clash[0]} is both tuned and set")
+        idle = [name for name in ranges if name not in self.names]
+        if idle:
+            raise TuneError(f"{idle[0]} has a range but is not tuned")
+        self.box = {name: ranges.get(name, DEFAULT_RANGES[name]) for name in self.names}
+        for name, each in self.box.items():
+            if each.low <= 0.0:
+                raise TuneError(f"the range of {name} does not begin above 0")
+            check_value(model.variable(name), each.low)
+            check_value(model.variable(name), each.high)
+        self.game = game_parameters(model, self.fixed)
+        self.graphs = (graph_of(self.game.adjacency),) if graphs is None else tuple(graphs)
+        if not self.graphs:
+            raise TuneError("there is no graph to tune for")
+        self.edges = [{}] if graphs is None else [graph.start_values(model) for graph in self.graphs]
+        self.loops = [graph.adjacency for graph in self.graphs]
+        self.deviation = initial_deviation(self.game)
+        largest = float(np.abs(self.deviation[: self.game.players]).max())
+        self.band = SETTLED * largest if band is None else band
+        if self.band <= 0.0:
+            raise TuneError("every player starts at its equilibrium: give the band that counts as settled")
+        self.start = {name: float(model.start_values(self.fixed)[name]) for name in self.names}
+
+    def run(self, seed: int, progress: Progress) -> Tuned:
+        """Both stages."""
+        start_metrics = self.simulate(self.start)
+        point, found = self._robust(seed, progress)
+        point, found = self._polished(point, found, progress)
+        gains = self.gains(point)
+        return Tuned(
+            gains=gains,
+            met=_met(found, self.wish),
+            wish=self.wish,
+            graphs=self.graphs,
+            metrics=tuple(found),
+            start_gains=self.start,
+            start_metrics=tuple(start_metrics),
+            slowest_rate=min(-spectral_abscissa(linear_loop(self.parameters(gains, a))) for a in self.loops),
+            simulations=self.simulations,
+        )
+
+    def gains(self, point: FloatArray) -> dict[str, float]:
+        """Gains of a point, rounded to four digits, within the box."""
+        rounded = {}
+        for (name, each), value in zip(self.box.items(), np.exp(point), strict=True):
+            rounded[name] = min(max(float(f"{value:.4g}"), each.low), each.high)
+        return rounded
+
+    def parameters(self, gains: Mapping[str, float], adjacency: FloatArray) -> GameParameters:
+        """The game's parameters for the linear loop."""
+        known = {name: value for name, value in gains.items() if name in LINEAR_GAINS}
+        return replace(self.game, adjacency=adjacency, **known)  # type: ignore[arg-type]
+
+    @property
+    def bounds(self) -> tuple[FloatArray, FloatArray]:
+        """Lower and upper corner of the box in logarithms."""
+        corners = [(each.low, each.high) for each in self.box.values()]
+        lower, upper = np.log(np.array(corners)).T
+        return lower, upper
+
+    @property
+    def small(self) -> bool:
+        """Whether an evaluation of the linear loop costs milliseconds."""
+        return self.game.players * (self.game.players + 2) <= LARGEST_DENSE
+
+    def _robust(self, seed: int, progress: Progress) -> tuple[FloatArray, list[Metrics | None]]:
+        """Points of the linear stage until one of them meets the wish in simulation, or the best of them."""
+        active = [int(np.argmin([_connectivity(adjacency) for adjacency in self.loops]))]
+        target = self.wish
+        point: FloatArray | None = None
+        best: tuple[float, FloatArray, list[Metrics | None]] = (np.inf, np.empty(0), [])
+        for number in range(ROUNDS):
+            progress("linear loop", number / ROUNDS)
+            point = self._linear(active, target, seed, point)
+            violations = np.array([self._violation(point, adjacency, target) for adjacency in self.loops])
+            hardest = int(np.argmax(violations))
+            if violations[hardest] > 0.0 and hardest not in active and number < ROUNDS - 1:
+                active = [*active[-(HARDEST - 1) :], hardest]
+                continue
+            progress("simulation", number / ROUNDS)
+            found = self.simulate(self.gains(point))
+            times = [_settling(each) for each in found]
+            longest = max(times)
+            if not best[2] or longest < best[0]:
+                best = (longest, point, found)
+            if longest <= self.wish:
+                break
+            worst = int(np.argmax(times))
+            if worst not in active:
+                active = [*active[-(HARDEST - 1) :], worst]
+            ratio = self.wish / longest if np.isfinite(longest) else 0.5
+            target = max(LEAST_TARGET * self.wish, target * TIGHTENING * ratio)
+        return best[1], best[2]
+
+    def _linear(
+        self, active: Sequence[int], target: float, seed: int, known: FloatArray | None
+    ) -> FloatArray:
+        """Least energy of the linear loop over the active graphs, from a point known to be near if any."""
+        from scipy.optimize import Bounds, differential_evolution
+
+        linear = [k for k, name in enumerate(self.names) if name in LINEAR_GAINS]
+        point = np.log([self.start[name] for name in self.names])
+        point = np.asarray(np.clip(point, *self.bounds))
+        if not linear:
+            return point
+
+        def cost(part: FloatArray) -> float:
+            point[linear] = part
+            return max(self._linear_cost(point, self.loops[k], target) for k in active)
+
+        lower, upper = self.bounds
+        box = Bounds(lower[linear], upper[linear])
+        found = differential_evolution(
+            cost,
+            box,
+            rng=seed,
+            popsize=8 if self.small else 5,
+            maxiter=12 if known is not None or not self.small else 40,
+            tol=0.01,
+            x0=None if known is None else np.clip(known[linear], lower[linear], upper[linear]),
+            polish=False,
+            init="sobol",
+        )
+        point[linear] = found.x
+        return point
+
+    def _linear_cost(self, point: FloatArray, adjacency: FloatArray, target: float) -> float:
+        loop = linear_loop(self.parameters(self._exact(point), adjacency))
+        if len(loop) > LARGEST_DENSE:
+            energy, overrun = self._stepped(loop, target)
+            return float(np.log(energy) + MISSED * max(0.0, overrun))
+        abscissa = spectral_abscissa(loop)
+        if abscissa >= 0.0:
+            return UNSTABLE + abscissa
+        violation = max(0.0, self._overrun(loop, target))
+        return float(np.log(linear_energy(loop, self.game, self.deviation)) + MISSED * violation)
+
+    def _violation(self, point: FloatArray, adjacency: FloatArray, target: float) -> float:
+        loop = linear_loop(self.parameters(self.gains(point), adjacency))
+        if len(loop) > LARGEST_DENSE:
+            return self._stepped(loop, target)[1] - SLACK
+        abscissa = spectral_abscissa(loop)
+        return UNSTABLE + abscissa if abscissa >= 0.0 else self._overrun(loop, target) - SLACK
+
+    def _overrun(self, loop: FloatArray, target: float) -> float:
+        """log(largest |x - x*| / band) from the target time on, to twice that time."""
+        from scipy.linalg import expm
+
+        state = expm(loop * target) @ self.deviation
+        step = expm(loop * (target / WINDOW))
+        largest = 0.0
+        for _ in range(WINDOW + 1):
+            largest = max(largest, float(np.abs(state[: self.game.players]).max()))
+            state = step @ state
+        return float(np.log(max(largest, np.finfo(float).tiny) / self.band))
+
+    def _stepped(self, loop: FloatArray, target: float) -> tuple[float, float]:
+        """Energy and overrun of a large loop, by steps of a hundredth of the target time."""
+        players = self.game.players
+        control = loop[_driven(self.game)]
+        states = np.array(list(stiff_response(loop, self.deviation, target / STEPS, 2 * STEPS)))
+        with np.errstate(over="ignore", invalid="ignore"):
+            power = np.square(np.einsum("cn,tnl->tcl", control, states)).sum(axis=(1, 2))
+            energy = 0.5 * float(np.sum(power[1:] + power[:-1])) * target / STEPS
+            largest = float(np.abs(states[STEPS:, :players]).max())
+        if not (np.isfinite(energy) and np.isfinite(largest)):
+            return float(np.exp(UNSTABLE / 10.0)), UNSTABLE
+        return energy, float(np.log(max(largest, np.finfo(float).tiny) / self.band))
+
+    def _exact(self, point: FloatArray) -> dict[str, float]:
+        return dict(zip(self.names, np.exp(point).tolist(), strict=True))
+
+    def _polished(
+        self, point: FloatArray, found: list[Metrics | None], progress: Progress
+    ) -> tuple[FloatArray, list[Metrics | None]]:
+        """Less energy by simulation on the two hardest graphs; kept if all graphs agree."""
+        from scipy.optimize import Bounds, minimize
+
+        times = [_settling(each) for each in found]
+        hardest = np.argsort(times)[-2:]
+        scale = self._worth(found)
+        runs = 0
+
+        def cost(trial: FloatArray) -> float:
+            nonlocal runs
+            runs += 1
+            progress("polishing", min(1.0, runs / POLISH_RUNS))
+            return self._worth([self._one(self.gains(trial), int(k)) for k in hardest]) - scale
+
+        simplex = np.vstack([point, point + np.diag(np.full(len(point), -0.15))])
+        lower, upper = self.bounds
+        options: Any = {
+            "maxfev": POLISH_RUNS,
+            "initial_simplex": np.clip(simplex, lower, upper),
+            "xatol": 1e-3,
+        }
+        better = minimize(cost, point, method="Nelder-Mead", bounds=Bounds(lower, upper), options=options)
+        checked = self.simulate(self.gains(better.x))
+        if self._worth(checked) < scale:
+            return np.asarray(better.x), checked
+        return point, found
+
+    def _worth(self, found: Sequence[Metrics | None]) -> float:
+        """What polishing lowers: the logarithm of the energy, plus a penalty for settling too late."""
+        longest, energy = max(_settling(each) for each in found), _largest_energy(found)
+        if not np.isfinite(longest):
+            return UNSTABLE
+        late = max(0.0, float(np.log(longest / (0.995 * self.wish))))
+        return float(np.log(energy)) + MISSED * late
+
+    def _one(self, gains: Mapping[str, float], graph: int) -> Metrics | None:
+        self.simulations += 1
+        try:
+            return self.sampler.measure({**self.fixed, **self.edges[graph], **gains}, self.settings)
+        except SimulationError:
+            return None
+
+    def simulate(self, gains: Mapping[str, float]) -> list[Metrics | None]:
+        """Figures of every graph's run, in this process or, for many graphs, in several."""
+        if self.jobs == 1 or len(self.graphs) < 16:  # noqa: PLR2004 - starting processes costs as much
+            return [self._one(gains, k) for k in range(len(self.graphs))]
+        values = [{**self.fixed, **edges, **gains} for edges in self.edges]
+        self.simulations += len(values)
+        found: list[Metrics | None] = [None] * len(values)
+        pool = open_pool(self.sampler.model.path, jobs=self.jobs)
+        try:
+            for outcomes in run_cases(pool, self.settings, [Case(k, each) for k, each in enumerate(values)]):
+                for outcome in outcomes:
+                    found[outcome.row] = outcome.metrics
+        finally:
+            pool.close()
+        return found
+
+
+def linear_energy(loop: FloatArray, game: GameParameters, deviation: FloatArray) -> float:
+    """Integral of |u|^2 from 0 to infinity of the loop s' = M s (n, n), stable, from the deviation (n, D).
+
+    There u = C s with the rows of M that drive the plant: x_i' = u_i (order 1), v_i' = u_i (order 2). So the
+    integral is sum_l s_l' P s_l with M' P + P M = -C' C.
+    """
+    from scipy.linalg import solve_continuous_lyapunov
+
+    control = loop[_driven(game)]
+    P = solve_continuous_lyapunov(loop.T, -control.T @ control)
+    return float(np.einsum("nl,nm,ml->", deviation, P, deviation))
+
+
+def stiff_response(loop: FloatArray, deviation: FloatArray, step: float, steps: int) -> Iterator[FloatArray]:
+    """States (n, D) of s' = M s at 0, step, ..., by the L-stable two-stage SDIRK method of order 2.
+
+    For loops with many players, whose matrix is sparse; both stages share one factorization.
+    """
+    from scipy.sparse import csc_array, eye_array
+    from scipy.sparse.linalg import splu
+
+    matrix = csc_array(loop)
+    part = 1.0 - np.sqrt(0.5)
+    solver = splu(csc_array(eye_array(len(loop)) - part * step * matrix))
+    state = deviation
+    yield state
+    with np.errstate(over="ignore", invalid="ignore"):
+        for _ in range(steps):
+            first = solver.solve(np.asarray(matrix @ state))
+            second = solver.solve(np.asarray(matrix @ (state + (1.0 - part) * step * first)))
+            state = state + step * ((1.0 - part) * first + part * second)
+            yield state
+
+
+def _driven(game: GameParameters) -> NDArray[np.int_]:
+    """Rows of M whose derivative is the control: x_i of order 1, v_i of order 2."""
+    return np.where(game.first_order, 0, game.players) + np.arange(game.players)
+
+
+def _connectivity(adjacency: FloatArray) -> float:
+    return float(np.linalg.eigvalsh(np.diag(adjacency.sum(axis=1)) - adjacency)[1])
+
+
+def _settling(found: Metrics | None) -> float:
+    return float("inf") if found is None or np.isnan(found.settling_time) else found.settling_time
+
+
+def _largest_energy(found: Sequence[Metrics | None]) -> float:
+    return max(float("inf") if each is None else each.control_energy for each in found)
+
+
+def _met(found: Sequence[Metrics | None], wish: float) -> bool:
+    return max(_settling(each) for each in found) <= wish

@@ -1,0 +1,143 @@
+"""Figures of runs against signals whose figures are known, and what they tell about their origin."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mixed_order_game import ResultError, Simulator, read_model, run
+from mixed_order_game.metrics import (
+    changed_values,
+    control_energy,
+    metrics,
+    overshoot,
+    provenance,
+    sample_times,
+    sampled_metrics,
+    settling_time,
+)
+from mixed_order_game.sweeping import Sampler, Settings
+
+
+def test_settling_time_of_an_exponential() -> None:
+    time = np.linspace(1.0, 11.0, 21)  # far too coarse but for the exponential in between
+    error = 3.0 * np.exp(-0.7 * (time - 1.0))
+    assert settling_time(time, error, 0.06) == pytest.approx(np.log(50.0) / 0.7, rel=1e-12)
+    assert settling_time(time, error, 3.0) == 0.0
+    assert np.isnan(settling_time(time, error, 1e-9))
+    error[15] = 1.0  # leaves the band once more
+    late = settling_time(time, error, 0.06)
+    assert time[15] - 1.0 < late < time[16] - 1.0
+    assert settling_time(np.array([0.0, 1.0]), np.array([1.0, 0.0]), 0.1) == 1.0
+
+
+def test_overshoot() -> None:
+    deviation = np.zeros((4, 1, 3))
+    deviation[:, 0, 0] = [10.0, 2.0, -3.0, -1.0]  # 3 beyond
+    deviation[:, 0, 1] = [-4.0, -5.0, 1.0, 0.0]  # farther on its own side is none
+    deviation[:, 0, 2] = [0.0, -2.0, 0.5, 0.0]  # starts at its equilibrium
+    assert overshoot(deviation) == pytest.approx(0.3)
+    assert overshoot(deviation[..., 1:]) == pytest.approx(0.5)
+    assert overshoot(deviation[:2, :, :1]) == 0.0
+    assert overshoot(np.zeros((3, 1, 1))) == 0.0
+    assert overshoot(deviation[..., 2:]) == np.inf
+
+
+def test_control_energy() -> None:
+    time = np.concatenate([np.linspace(0.0, 1.0, 400), np.linspace(1.1, 20.0, 190)])
+    u = np.stack([np.exp(-3.0 * time), 2.0 * np.exp(-5.0 * time)], axis=-1)[:, np.newaxis, :]
+    assert control_energy(time, u) == pytest.approx(1.0 / 6.0 + 4.0 / 10.0, rel=1e-3)
+
+
+def test_sample_times() -> None:
+    time = sample_times(20.0, 0.02)
+    assert len(time) == 1001 + 190
+    assert time[0] == 0.0
+    assert time[-1] == 20.0
+    assert np.all(np.diff(time) > 0.0)
+    np.testing.assert_allclose(np.diff(time[:201]), 0.001, rtol=1e-9)
+    assert sample_times(1.0, 0.5).tolist() == pytest.approx(np.linspace(0.0, 1.0, 41).tolist())
+
+
+def test_windows() -> None:
+    time = np.linspace(0.0, 10.0, 101)
+    deviation = np.full((101, 2, 1), 0.5)
+    deviation[:80] = 3.0
+    found = sampled_metrics(time, deviation, None)
+    assert found.final_error == 0.5
+    assert np.isnan(found.control_energy)
+    assert np.isnan(found.settling_time)
+    assert found.band == pytest.approx(0.06)
+    assert sampled_metrics(time, deviation, None, settle_time=7.0, band=1.0).final_error == 3.0
+    assert sampled_metrics(time, deviation, None, band=1.0).settling_time == pytest.approx(7.96, abs=0.05)
+    with pytest.raises(ResultError, match="no sample from 11 s on"):
+        sampled_metrics(time, deviation, None, settle_time=11.0)
+    assert found.as_json()["settling_time"] is None
+    json.dumps(found.as_json(), allow_nan=False)
+
+
+def test_of_a_result(fmu: Path) -> None:
+    result = run(fmu)
+    found = metrics(result)
+    assert 0.3 < found.settling_time < 1.0
+    settled = np.abs(result.x - result.x_star).max(axis=(1, 2)) <= found.band
+    assert settled[result.time > found.settling_time].all()
+    assert found.final_error == result.largest_error(16.0)
+    assert found.events == result["solver_events"][-1] > 0.0
+    assert found.control_peak == pytest.approx(np.abs(result.u).max())
+    without_u = metrics(run(fmu, outputs=["x"], stop_time=1.0))
+    assert np.isnan([without_u.control_energy, without_u.events]).all()
+
+
+def test_equilibrium_that_moves(fmu: Path) -> None:
+    changes = {5.0: {f"cost_linear[{i},1]": 0.0 for i in range(1, 6)}}
+    result = run(fmu, stop_time=10.0, changes=changes, outputs=["x", "x_star"])
+    assert 5.0 < metrics(result).settling_time < 7.0
+
+
+def test_sampler_equals_the_simulator(fmu: Path) -> None:
+    values = {"k1": 12.0, "a[1,3]": 0.5, "robust": True}
+    settings = Settings(stop_time=3.0)
+    with Sampler(fmu) as sampler, Simulator(fmu) as simulator:
+        first, again = sampler.measure(values, settings), sampler.measure(values, settings)
+        recorded = sampler.record(values, settings)
+        other = sampler.measure({}, settings)
+        result = simulator.run(start_values=values, stop_time=3.0)
+    assert first == again == metrics(recorded)
+    assert first != other
+    assert first.final_error == pytest.approx(metrics(result).final_error, rel=1e-4)
+    assert first.settling_time == pytest.approx(metrics(result).settling_time, rel=1e-3)
+    regular = np.isin(np.round(recorded.time, 9), np.round(result.time, 9))
+    np.testing.assert_allclose(recorded.x[regular], result.x, atol=1e-5)
+    assert recorded.parameters == result.parameters
+    np.testing.assert_allclose(recorded.nash_error[regular], result.nash_error, atol=1e-5)
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"stop_time": 0.0},
+        {"step": -1.0},
+        {"tolerance": float("nan")},
+        {"step": 30.0},
+        {"settle_time": 21.0},
+        {"band": 0.0},
+    ],
+)
+def test_settings_that_make_no_sense(wrong: dict[str, float]) -> None:
+    from mixed_order_game import SimulationError
+
+    with pytest.raises(SimulationError, match=next(iter(wrong))):
+        Settings(**wrong)  # type: ignore[arg-type]
+
+
+def test_provenance(fmu: Path) -> None:
+    result = run(fmu, start_values={"k1": 12.0, "k2": 1.0, "perturbed": False}, stop_time=0.1)
+    model = read_model(fmu)
+    origin = provenance(model, result.parameters, seed=5)
+    assert origin.changed == {"k1": 12.0, "perturbed": False}
+    assert origin.guid == model.guid
+    assert origin.package_version == result.package_version
+    assert json.loads(json.dumps(origin.as_json()))["seed"] == 5
+    assert changed_values(model, {"x0[1,1]": -5.0, "x0[1,2]": 7.0}) == {"x0[1,2]": 7.0}

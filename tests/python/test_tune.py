@@ -1,0 +1,118 @@
+"""Tuned gains: the linear stage against quadrature and time stepping, and gains that the FMU confirms."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.linalg import expm
+
+from mixed_order_game import read_model
+from mixed_order_game.designs import Range
+from mixed_order_game.errors import VariableError
+from mixed_order_game.graphs import GraphError, graphs_of_text
+from mixed_order_game.parameters import game_parameters
+from mixed_order_game.spectrum import initial_deviation, linear_loop
+from mixed_order_game.sweeping import Sampler, Settings
+from mixed_order_game.tune import TuneError, linear_energy, stiff_response, tune
+from tests.conftest import FmuOf
+
+
+@pytest.mark.parametrize("name", ["five_vehicles", "interleaved_orders"])
+def test_linear_energy_is_the_integral(name: str, fmu_of: FmuOf) -> None:
+    """u = -k1 (x - z) and -k4 (v + k2 grad f(y)) of the paper, integrated along the exact solution."""
+    game = game_parameters(read_model(fmu_of(name)))
+    loop, state = linear_loop(game), initial_deviation(game)
+    N = game.players
+    propagator, step = expm(loop * 1e-4), 1e-4
+    coupling = game.cost_coupling - np.diag(np.diag(game.cost_coupling))
+    h = 2.0 * (np.diag(game.cost_quadratic + coupling.sum(axis=1)) - coupling)
+    first = game.first_order[:, np.newaxis]
+    power = []
+    for _ in range(30000):
+        x, p, y = state[:N], state[N : 2 * N], state[2 * N :].reshape(N, N, -1)
+        gradient = np.einsum("ij,ijl->il", h, y)
+        u = np.where(first, -game.k1 * (x - p), -game.k4 * (p + game.k2 * gradient))
+        power.append(np.sum(u * u))
+        state = propagator @ state
+    integral = step * (np.sum(power) - 0.5 * (power[0] + power[-1]))
+    assert linear_energy(loop, game, initial_deviation(game)) == pytest.approx(integral, rel=1e-3)
+
+
+def test_stiff_response(fmu: Path) -> None:
+    game = replace(game_parameters(read_model(fmu)), k1=3.0, k3=200.0)
+    loop, start = linear_loop(game), initial_deviation(game)
+    errors = []
+    for steps in (100, 200):
+        states = list(stiff_response(loop, start, 2.0 / steps, steps))
+        assert len(states) == steps + 1
+        errors.append(np.abs(states[-1] - expm(2.0 * loop) @ start).max())
+    assert errors[1] < 0.35 * errors[0]
+    assert errors[1] < 1e-2
+
+
+def test_gains_on_the_games_own_graph(fmu: Path) -> None:
+    found = tune(fmu, 1.0, seed=1)
+    assert found.met
+    assert set(found.gains) == {"k1", "k2", "k3", "k4"}
+    assert 0.5 < found.settling_time <= 1.0
+    assert found.slowest_rate > 0.0
+    with Sampler(fmu) as sampler:
+        proof = sampler.measure(found.gains, Settings(stop_time=4.0))
+    assert proof == found.metrics[0]
+    # The gains of the paper's example settle in 0.6 s at the price of much more energy.
+    before = found.start_metrics[0]
+    assert before is not None
+    assert found.control_energy < 0.5 * before.control_energy
+    assert found.as_json()["met"] is True
+
+
+def test_gains_on_several_graphs_with_more_gains(fmu: Path) -> None:
+    graphs = [graph for text in ("ring", "path", "star") for graph in graphs_of_text(text, 5)]
+    found = tune(fmu, 1.5, graphs=graphs, gains=["k1", "k2", "k4", "delta"], seed=2)
+    assert found.met
+    assert len(found.metrics) == 3
+    assert set(found.gains) == {"k1", "k2", "k4", "delta"}
+    for graph, told in zip(graphs, found.metrics, strict=True):
+        with Sampler(fmu) as sampler:
+            values = {**graph.start_values(sampler.model), **found.gains}
+            assert sampler.measure(values, Settings(stop_time=6.0)) == told
+        assert told is not None
+        assert told.settling_time <= 1.5
+
+
+def test_wish_that_cannot_be_met(fmu: Path) -> None:
+    found = tune(fmu, 0.5, gains=["k1", "k2"], ranges={"k1": Range(1.0, 2.0), "k2": Range(0.1, 0.2)})
+    assert not found.met
+    assert found.settling_time > 0.5
+    assert 1.0 <= found.gains["k1"] <= 2.0
+
+
+@pytest.mark.parametrize(
+    ("options", "error", "told"),
+    [
+        ({"settling_time": 0.0}, TuneError, "0 s is not positive"),
+        ({"stop_time": 0.5}, TuneError, "cannot show"),
+        ({"gains": []}, TuneError, "every gain"),
+        ({"gains": ["k1", "k1"]}, TuneError, "once"),
+        ({"gains": ["rho"]}, TuneError, "rho is not a gain"),
+        ({"ranges": {"delta": Range(1.0, 2.0)}}, TuneError, "delta has a range but is not tuned"),
+        ({"ranges": {"k1": Range(0.0, 2.0)}}, TuneError, "k1 does not begin above 0"),
+        ({"start_values": {"k1": 2.0}}, TuneError, "k1 is both tuned and set"),
+        ({"start_values": {"k9": 2.0}}, VariableError, "k9"),
+        ({"graphs": []}, TuneError, "no graph"),
+        ({"graphs": graphs_of_text("ring", 4)}, GraphError, "4 players"),
+        (
+            {"start_values": {**{f"x0[{i},{k}]": -0.5 for i in range(1, 6) for k in (1, 2)}}},
+            TuneError,
+            "band",
+        ),
+    ],
+)
+def test_wishes_that_make_no_sense(
+    options: dict[str, object], error: type[Exception], told: str, fmu: Path
+) -> None:
+    arguments: dict[str, object] = {"settling_time": 1.0, **options}
+    with pytest.raises(error) as raised:
+        tune(fmu, **arguments)  # type: ignore[arg-type]
+    assert told in str(raised.value)
