@@ -30,7 +30,7 @@ EXAMPLES = r"""Run a game many times: over grids, samples, graphs and random ini
 
     mog sweep --grid k1=5:20:4 --grid delta=5,10,20 --output gains --heat-map k1,delta,final_error
 
-    mog sweep --range k2=0.5:2 --range k3=10:100:log --samples 64 --design sobol --graphs random:0.5@9
+    mog sweep --range k2=0.5:2 --range k3=10:200:log --samples 64 --design sobol --graphs random:0.5@9
 
     mog sweep my_game.toml --initial-states 50 --initial-actions -5:5 --scheduler tcp://10.0.0.1:8786
     """
