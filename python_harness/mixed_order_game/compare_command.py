@@ -142,12 +142,12 @@ def _print(found: "Comparison") -> None:
     from .metrics import METRIC_UNITS
 
     console = Console(highlight=False)
-    table = Table(Column("run", no_wrap=True), box=SIMPLE_HEAD)
+    table = Table(Column("run", no_wrap=True), box=SIMPLE_HEAD, padding=(0, 1, 0, 0))
     for name, unit in METRIC_UNITS.items():
-        table.add_column(name.replace("_", " ") + (f" ({unit})" if unit else ""))
+        table.add_column(name.replace("_", " ") + (f" ({unit})" if unit else ""), min_width=9)
     for run in found.runs:
         figures = [None if run.metrics is None else getattr(run.metrics, name) for name in METRIC_UNITS]
-        table.add_row(Text(run.label), *("-" if value is None else f"{value:.4g}" for value in figures))
+        table.add_row(Text(run.label), *("-" if value is None else f"{value:.3g}" for value in figures))
     console.print(table)
     for run in found.runs:
         if run.error:
