@@ -101,6 +101,24 @@ def shipped_games() -> dict[str, Path]:
     return games
 
 
+def game_file(game: Path) -> Path:
+    """The game file meant by an argument: a file, or a game of the package by its name. Raises GameError."""
+    if game.suffix == ".toml":
+        return game
+    if game.suffix:
+        raise GameError(f"{game} is neither an FMU (.fmu) nor a game file (.toml)")
+    return shipped_game(str(game))
+
+
+def fmu_of(game: Path | None) -> Path:
+    """The FMU meant by an argument, the paper's for None; a game is made into one and kept in the cache."""
+    if game is None:
+        return default_fmu()
+    if game.suffix == ".fmu":
+        return game
+    return cached_fmu(game_file(game))
+
+
 def native_directory() -> Path:
     """Folder of the compiled parts. Raises BuildError if this installation has none."""
     for folder in _package_folders():

@@ -16,8 +16,9 @@ import typer.core
 
 from .analysis.command import register as register_analyse
 from .authoring.command import register as register_authoring
+from .build import fmu_of, game_file
 from .compare_command import register as register_compare
-from .errors import GameError, MixedOrderGameError
+from .errors import MixedOrderGameError
 from .reporting.command import register as register_report
 from .sweep_command import register as register_sweep
 from .tune_command import register as register_tune
@@ -107,7 +108,7 @@ def build(
     """
     from .build import build_fmu, default_game
 
-    typer.echo(build_fmu(default_game() if game is None else _game_file(game), output))
+    typer.echo(build_fmu(default_game() if game is None else game_file(game), output))
 
 
 @app.command()
@@ -123,7 +124,7 @@ def info(
     from .model import read_model
     from .tables import info_data, print_info
 
-    model = read_model(_fmu(game))
+    model = read_model(fmu_of(game))
     if as_json:
         typer.echo(json.dumps(info_data(model, variables=variables), indent=2))
     else:
@@ -183,14 +184,13 @@ def run(
     from .names import split_names
     from .run import Simulator
     from .schedule import read_disturbance, read_graph_schedule
+    from .sweeping.options import settings_of
     from .tables import print_result
 
-    values = dict(_setting(text) for text in settings or [])
-    if len(values) != len(settings or []):
-        raise typer.BadParameter("a variable is set twice", param_hint="--set")
+    values = settings_of(settings or [])
     if output is not None and output.suffix not in (".csv", ".parquet"):
         raise typer.BadParameter("the file must end in .csv or .parquet", param_hint="--output")
-    with Simulator(_fmu(game)) as simulator, _progress() as show:
+    with Simulator(fmu_of(game)) as simulator, _progress() as show:
         model = simulator.model
         stop = model.stop_time if stop_time is None else stop_time
         span = stop - start_time
@@ -237,7 +237,7 @@ def validate(
     """
     from .validate import validate as judge
 
-    fmu = _fmu(game)
+    fmu = fmu_of(game)
     with _progress() as show:
         verdict = judge(fmu, neighbourhood=neighbourhood, settle_time=settle_time, progress=show)
     _report(verdict, as_json=as_json)
@@ -272,7 +272,7 @@ def plot(
     if source is not None and source.suffix in (".csv", ".parquet"):
         figures = result_figures(load(source), width=inches)
     else:
-        with Simulator(_fmu(source)) as simulator:
+        with Simulator(fmu_of(source)) as simulator:
             robust, plain = (
                 simulator.run(
                     start_values={"robust": on, "perturbed": on}, stop_time=simulator.model.stop_time
@@ -301,7 +301,7 @@ def demo(
     """
     from .demo import demo as demonstrate
 
-    path = _fmu(fmu)
+    path = fmu_of(fmu)
     with _progress() as show:
         done = demonstrate(path, output, suffix=f".{file_format.value}", progress=show)
     for file in done.files:
@@ -320,43 +320,6 @@ register_tune(app)
 def main() -> None:
     """Entry point of the command."""
     app()
-
-
-def _fmu(game: Path | None) -> Path:
-    """The FMU meant by an argument; a game file is made into one, kept in the user's cache."""
-    from .build import cached_fmu, default_fmu
-
-    if game is None:
-        return default_fmu()
-    if game.suffix == ".fmu":
-        return game
-    return cached_fmu(_game_file(game))
-
-
-def _game_file(game: Path) -> Path:
-    """The game file meant by an argument: a file, or a game of the package by its name."""
-    from .build import shipped_game
-
-    if game.suffix == ".toml":
-        return game
-    if game.suffix:
-        raise GameError(f"{game} is neither an FMU (.fmu) nor a game file (.toml)")
-    return shipped_game(str(game))
-
-
-def _setting(text: str) -> tuple[str, float | bool]:
-    name, separator, value = text.partition("=")
-    if not (name.strip() and separator):
-        raise typer.BadParameter(f"NAME=VALUE expected, not {text!r}", param_hint="--set")
-    booleans = {"true": True, "false": False}
-    if value.strip().lower() in booleans:
-        return name.strip(), booleans[value.strip().lower()]
-    try:
-        return name.strip(), float(value)
-    except ValueError:
-        raise typer.BadParameter(
-            f"the value of {name.strip()} must be a number, true or false, not {value!r}", param_hint="--set"
-        ) from None
 
 
 def _report(verdict: "Validation", *, as_json: bool) -> None:

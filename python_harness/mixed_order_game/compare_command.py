@@ -77,11 +77,12 @@ def compare(
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,  # noqa: FBT002
 ) -> None:
     """Set runs side by side."""
+    from .build import fmu_of
     from .compare import Comparison, compare_results, load_results
     from .compare import compare as run_variants
     from .model import read_model
     from .sweeping import Settings
-    from .sweeping.options import fmu_of, settings_of
+    from .sweeping.options import settings_of
 
     fixed = settings_of(settings or [])
     wanted = dict(_variant(text) for text in variants or [])

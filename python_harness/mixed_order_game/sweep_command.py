@@ -132,11 +132,12 @@ def sweep(
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,  # noqa: FBT002
 ) -> None:
     """Run a game many times."""
+    from .build import fmu_of
     from .designs import grid_of_text, range_of_text
     from .model import read_model
     from .sweeping import Settings, Sweep, connected_graphs_example
     from .sweeping import sweep as conduct
-    from .sweeping.options import counted_progress, fmu_of, graphs_option, pairs_of, range_option, settings_of
+    from .sweeping.options import counted_progress, graphs_option, pairs_of, range_option, settings_of
 
     maps = [_heat_map(text) for text in heat_maps or []]
     fixed = settings_of(settings or [])

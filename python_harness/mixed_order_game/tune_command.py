@@ -77,10 +77,11 @@ def tune(
     """Find gains."""
     from rich.console import Console
 
+    from .build import fmu_of
     from .designs import range_of_text
     from .model import read_model
     from .names import split_names
-    from .sweeping.options import fmu_of, graphs_option, pairs_of, settings_of
+    from .sweeping.options import graphs_option, pairs_of, settings_of
     from .tune import tune as search
 
     fixed = settings_of(settings or [])

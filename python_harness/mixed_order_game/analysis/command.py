@@ -41,6 +41,7 @@ def analyse(
     mog analyse --no-square --radius 0.01 --set k3=100
     """
     from ..build import default_game, shipped_game
+    from ..sweeping.options import settings_of
     from .analysis import analyse as run_analysis
     from .rendering import print_analysis
 
@@ -51,7 +52,7 @@ def analyse(
     with _progress() as show:
         found = run_analysis(
             game,
-            changes=dict(_setting(text) for text in settings or []),
+            changes=settings_of(settings or []),
             simulation=simulation,
             square=square,
             radius=radius,
@@ -66,20 +67,6 @@ def analyse(
 def register(app: typer.Typer) -> None:
     """Add the command to an application."""
     app.command()(analyse)
-
-
-def _setting(text: str) -> tuple[str, float | bool]:
-    name, separator, value = text.partition("=")
-    if not (name.strip() and separator):
-        raise typer.BadParameter(f"NAME=VALUE expected, not {text!r}", param_hint="--set")
-    booleans = {"true": True, "false": False}
-    if value.strip().lower() in booleans:
-        return name.strip(), booleans[value.strip().lower()]
-    try:
-        return name.strip(), float(value)
-    except ValueError:
-        told = f"the value of {name.strip()} must be a number, true or false, not {value!r}"
-        raise typer.BadParameter(told, param_hint="--set") from None
 
 
 @contextmanager

@@ -3,14 +3,11 @@
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from pathlib import Path
 from typing import TypeVar
 
 import typer
 
-from ..build import cached_fmu, default_fmu
 from ..designs import DesignError, Range, range_of_text
-from ..errors import GameError
 from ..graphs import CommunicationGraph, GraphError, graph_of_model, graphs_of_text
 from ..model import Model, Value
 from ..names import split_names
@@ -19,17 +16,6 @@ Parsed = TypeVar("Parsed")
 
 LINE_EVERY = 10.0
 """Time in s between lines of progress when stderr is not a terminal."""
-
-
-def fmu_of(game: Path | None) -> Path:
-    """The FMU meant by an argument; a game file is made into one, kept in the user's cache."""
-    if game is None:
-        return default_fmu()
-    if game.suffix == ".fmu":
-        return game
-    if game.suffix == ".toml":
-        return cached_fmu(game)
-    raise GameError(f"{game} is neither an FMU (.fmu) nor a game file (.toml)")
 
 
 def settings_of(texts: Iterable[str], hint: str = "--set") -> dict[str, Value]:
