@@ -27,6 +27,12 @@ class Cost {
   /// The entries of hessian_pattern(), row entry(i, l) at the joint action points + i * stride.
   virtual void hessian_rows(const Real* points, int stride, Real* values) const = 0;
 
+  /// The same family with every coefficient zero, for the coefficients of a direction.
+  [[nodiscard]] virtual std::unique_ptr<Cost> zero_direction() const = 0;
+
+  /// The derivative of own_gradients() with respect to the coefficients, along those of a direction.
+  virtual void own_gradients_along(const Cost& direction, const Real* points, int stride, Real* derivative) const = 0;
+
   /// Rebuilds what was derived from coefficients; called after any of them changed.
   virtual void refresh() = 0;
 };

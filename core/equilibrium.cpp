@@ -53,6 +53,30 @@ bool is_regular(const Eigen::PartialPivLU<Eigen::MatrixXd>& lu) {
   return lu.matrixLU().allFinite() && pivots.minCoeff() > singular * pivots.maxCoeff() && lu.rcond() > singular;
 }
 
+/// Replaces b by the solution of J solution = b, where J is the Jacobian of the pseudo-gradient.
+void solve_in_place(const std::vector<std::vector<int>>& groups, const SparseRows& pattern,
+                    const std::vector<Real>& hessian, std::vector<Real>& b) {
+  for (const std::vector<int>& group : groups) {
+    const Eigen::PartialPivLU<Eigen::MatrixXd> lu(block_of(group, pattern, hessian));
+    if (!is_regular(lu)) {
+      throw GameError(
+          "the game has no unique Nash equilibrium: the Jacobian of its pseudo-gradient is singular"
+          " (reciprocal condition number below 1e-13), expected cost parameters that make it regular");
+    }
+    const auto size = static_cast<Eigen::Index>(group.size());
+    Eigen::VectorXd solution(size);
+    for (Eigen::Index k = 0; k < size; ++k) solution(k) = b[at(group[at(k)])];
+    solution = lu.solve(solution);
+    for (Eigen::Index k = 0; k < size; ++k) b[at(group[at(k)])] = solution(k);
+  }
+}
+
+Real largest_magnitude(const std::vector<Real>& numbers) {
+  Real largest = 0.0;
+  for (const Real number : numbers) largest = std::max(largest, std::abs(number));
+  return largest;
+}
+
 }  // namespace
 
 std::vector<Real> nash_equilibrium(const Cost& cost, const Shape& shape) {
@@ -61,33 +85,31 @@ std::vector<Real> nash_equilibrium(const Cost& cost, const Shape& shape) {
   const SparseRows& pattern = cost.hessian_pattern();
   const std::vector<std::vector<int>> groups = independent_groups(pattern);
   std::vector<Real> hessian(at(pattern.entries()));
-  std::vector<Real> gradient(n);
+  std::vector<Real> step(n);
   std::vector<Real> x(n, 0.0);
   for (int iteration = 0; iteration < most_iterations; ++iteration) {
-    cost.own_gradients(x.data(), 0, gradient.data());
+    cost.own_gradients(x.data(), 0, step.data());
     cost.hessian_rows(x.data(), 0, hessian.data());
-    Real largest_step = 0.0;
-    Real largest = 0.0;
-    for (const std::vector<int>& group : groups) {
-      const Eigen::PartialPivLU<Eigen::MatrixXd> lu(block_of(group, pattern, hessian));
-      if (!is_regular(lu)) {
-        throw GameError(
-            "the game has no unique Nash equilibrium: the Jacobian of its pseudo-gradient is singular"
-            " (reciprocal condition number below 1e-13), expected cost parameters that make it regular");
-      }
-      const auto size = static_cast<Eigen::Index>(group.size());
-      Eigen::VectorXd step(size);
-      for (Eigen::Index k = 0; k < size; ++k) step(k) = gradient[at(group[at(k)])];
-      step = lu.solve(step);
-      for (Eigen::Index k = 0; k < size; ++k) x[at(group[at(k)])] -= step(k);
-      for (const int entry : group) largest = std::max(largest, std::abs(x[at(entry)]));
-      largest_step = std::max(largest_step, step.lpNorm<Eigen::Infinity>());
-    }
-    if (largest_step <= 1e-14 * (1.0 + largest)) return x;
+    solve_in_place(groups, pattern, hessian, step);
+    for (std::size_t p = 0; p < n; ++p) x[p] -= step[p];
+    if (largest_magnitude(step) <= 1e-14 * (1.0 + largest_magnitude(x))) return x;
   }
   const bool finite = std::all_of(x.begin(), x.end(), [](Real entry) { return std::isfinite(entry); });
   if (!finite) throw GameError("the search for the Nash equilibrium did not converge, expected costs with one");
   return x;
+}
+
+// P(x*) = 0 at every cost, so that (dP/dx) dx* = -dP, the change of P at a fixed x
+std::vector<Real> nash_equilibrium_along(const Cost& cost, const Cost& direction, const Shape& shape,
+                                         const std::vector<Real>& x_star) {
+  const SparseRows& pattern = cost.hessian_pattern();
+  std::vector<Real> hessian(at(pattern.entries()));
+  std::vector<Real> along(at(shape.actions()));
+  cost.hessian_rows(x_star.data(), 0, hessian.data());
+  cost.own_gradients_along(direction, x_star.data(), 0, along.data());
+  for (Real& entry : along) entry = -entry;
+  solve_in_place(independent_groups(pattern), pattern, hessian, along);
+  return along;
 }
 
 Real strong_monotonicity(const Cost& cost, const Shape& shape) {

@@ -55,7 +55,7 @@ void LoopJacobian::linearize(const Real* state, const Signals& signals, const Mo
   }
 }
 
-void LoopJacobian::multiply(const Real* vector, Real* product) const {
+void LoopJacobian::multiply(const Real* vector, Real* product, Real* control) const {
   const Kernels& kernel = kernels();
   const Parameters& parameters = loop_->parameters();
   const Shape& shape = loop_->shape();
@@ -109,6 +109,7 @@ void LoopJacobian::multiply(const Real* vector, Real* product) const {
     }
     const Real de = second ? dreference[p] + gains.k2 * dgradient : dx[p] - dreference[p];
     const Real du = -((second ? gains.k4 : gains.k1) + slope[at(p)]) * de - dnetwork[p];
+    if (control != nullptr) control[p] = du;
     product[layout.x() + p] = second ? dreference[p] : du + dg;
     product[layout.reference() + p] = second ? du + dg : -gains.k2 * dgradient;
     dshared[p] = second ? dx[p] : dreference[p];

@@ -22,8 +22,8 @@ class LoopJacobian {
   /// Linearizes at a state; signals are those of ClosedLoop::evaluate_seeking at the same state.
   void linearize(const Real* state, const Signals& signals, const Modes& modes);
 
-  /// product = J vector, both of the state's length.
-  void multiply(const Real* vector, Real* product) const;
+  /// product = J vector, both of the state's length; control, unless null, takes (d u / d state) vector.
+  void multiply(const Real* vector, Real* product, Real* control = nullptr) const;
 
   /// All entries that may differ from zero, each position once; the matrix of multiply(), written out entry by entry.
   /// With coupled = false the derivatives of the activations with respect to the estimates are left out.

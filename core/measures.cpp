@@ -10,6 +10,15 @@ Real nash_error(const Real* x, const Real* x_star, int entries) {
   return std::sqrt(squares);
 }
 
+// d |x - x*| = (x - x*)'(dx - dx*) / |x - x*|
+Real nash_error_along(const Real* x, const Real* x_star, const Real* x_along, const Real* x_star_along, int entries) {
+  const Real error = nash_error(x, x_star, entries);
+  if (error == 0.0) return 0.0;
+  Real product = 0.0;
+  for (int p = 0; p < entries; ++p) product += (x[p] - x_star[p]) * (x_along[p] - x_star_along[p]);
+  return product / error;
+}
+
 Real consensus_error(const ClosedLoop& loop, const Real* state, const Signals& signals) {
   const int n = loop.shape().actions();
   Real squares = 0.0;

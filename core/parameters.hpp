@@ -52,6 +52,20 @@ struct Parameters {
   Cloned<Disturbance> disturbance;
   InitialState initial;
 
+  /// The same game with every coefficient and initial value zero, for those of a direction.
+  [[nodiscard]] Parameters zero_direction() const {
+    const auto zeros = [](const std::vector<Real>& like) { return std::vector<Real>(like.size(), 0.0); };
+    return {.shape = shape,
+            .gains = {},
+            .strategy = strategy,
+            .rbf = {.diagonal = rbf.diagonal, .centers = zeros(rbf.centers)},
+            .graph = CommunicationGraph(shape.players),
+            .cost = Cloned(cost->zero_direction()),
+            .dynamics = Cloned(dynamics->zero_direction()),
+            .disturbance = Cloned(disturbance->zero_direction()),
+            .initial = {zeros(initial.x), zeros(initial.reference), zeros(initial.y)}};
+  }
+
   /// Rebuilds what is derived from coefficients; called after any of them changed.
   void refresh() {
     graph.refresh();

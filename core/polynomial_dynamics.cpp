@@ -45,4 +45,15 @@ void PolynomialDynamics::jacobian(const Real* x, Real* values) const {
   }
 }
 
+std::unique_ptr<UnknownDynamics> PolynomialDynamics::zero_direction() const {
+  auto direction = std::make_unique<PolynomialDynamics>(*this);
+  std::fill(direction->gain.begin(), direction->gain.end(), 0.0);
+  return direction;
+}
+
+// g is linear in the gains
+void PolynomialDynamics::values_along(const UnknownDynamics& direction, const Real* x, Real* derivative) const {
+  direction.values(x, derivative);
+}
+
 }  // namespace mixed_order_game

@@ -25,6 +25,8 @@ class PolynomialDynamics final : public UnknownDynamics {
   void values(const Real* x, Real* g) const override;
   [[nodiscard]] const SparseRows& jacobian_pattern() const override { return pattern_; }
   void jacobian(const Real* x, Real* values) const override;
+  [[nodiscard]] std::unique_ptr<UnknownDynamics> zero_direction() const override;
+  void values_along(const UnknownDynamics& direction, const Real* x, Real* derivative) const override;
 
  private:
   int players_;

@@ -47,6 +47,15 @@ void QuadraticCost::hessian_rows(const Real* /*points*/, int /*stride*/, Real* v
   std::copy(hessian_.begin(), hessian_.end(), values);
 }
 
+std::unique_ptr<Cost> QuadraticCost::zero_direction() const {
+  return std::make_unique<QuadraticCost>(players_, dimension_);
+}
+
+// the gradients are linear in the coefficients
+void QuadraticCost::own_gradients_along(const Cost& direction, const Real* points, int stride, Real* derivative) const {
+  direction.own_gradients(points, stride, derivative);
+}
+
 void QuadraticCost::refresh() {
   neighbours_ = {};
   neighbour_cost_.clear();

@@ -20,6 +20,8 @@ class QuadraticCost final : public Cost {
   void own_gradients(const Real* points, int stride, Real* gradient) const override;
   [[nodiscard]] const SparseRows& hessian_pattern() const override { return pattern_; }
   void hessian_rows(const Real* points, int stride, Real* values) const override;
+  [[nodiscard]] std::unique_ptr<Cost> zero_direction() const override;
+  void own_gradients_along(const Cost& direction, const Real* points, int stride, Real* derivative) const override;
   void refresh() override;
 
  private:

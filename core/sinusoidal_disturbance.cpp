@@ -24,4 +24,17 @@ void SinusoidalDisturbance::rates(Real t, Real* rate) const {
   }
 }
 
+std::unique_ptr<Disturbance> SinusoidalDisturbance::zero_direction() const {
+  return std::make_unique<SinusoidalDisturbance>(static_cast<int>(amplitude.size()));
+}
+
+void SinusoidalDisturbance::values_along(const Disturbance& direction, Real t, Real* derivative) const {
+  const auto& change = static_cast<const SinusoidalDisturbance&>(direction);
+  for (std::size_t p = 0; p < amplitude.size(); ++p) {
+    const Real angle = frequency[p] * t + phase[p];
+    derivative[p] = change.bias[p] + change.amplitude[p] * std::sin(angle) +
+                    amplitude[p] * std::cos(angle) * (change.frequency[p] * t + change.phase[p]);
+  }
+}
+
 }  // namespace mixed_order_game

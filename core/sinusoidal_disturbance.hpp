@@ -18,6 +18,8 @@ class SinusoidalDisturbance final : public Disturbance {
   [[nodiscard]] std::unique_ptr<Disturbance> clone() const override;
   void values(Real t, Real* d) const override;
   void rates(Real t, Real* rate) const override;
+  [[nodiscard]] std::unique_ptr<Disturbance> zero_direction() const override;
+  void values_along(const Disturbance& direction, Real t, Real* derivative) const override;
 };
 
 }  // namespace mixed_order_game

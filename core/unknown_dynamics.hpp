@@ -21,6 +21,12 @@ class UnknownDynamics {
 
   /// The entries of jacobian_pattern() at x.
   virtual void jacobian(const Real* x, Real* values) const = 0;
+
+  /// The same family with every coefficient that can change zero, for the coefficients of a direction.
+  [[nodiscard]] virtual std::unique_ptr<UnknownDynamics> zero_direction() const = 0;
+
+  /// The derivative of values() with respect to those coefficients, along those of a direction.
+  virtual void values_along(const UnknownDynamics& direction, const Real* x, Real* derivative) const = 0;
 };
 
 }  // namespace mixed_order_game

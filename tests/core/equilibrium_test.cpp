@@ -79,6 +79,11 @@ class ExponentialCost final : public Cost {
     values[2] = -1.0;
     values[3] = std::cosh(points[stride + 1]);
   }
+  [[nodiscard]] std::unique_ptr<Cost> zero_direction() const override { return clone(); }
+  void own_gradients_along(const Cost& /*direction*/, const Real* /*points*/, int /*stride*/,
+                           Real* derivative) const override {
+    derivative[0] = derivative[1] = 0.0;
+  }
   void refresh() override {}
 
  private:
@@ -94,6 +99,38 @@ TEST(NashEquilibrium, OfOtherCostsTakesNewtonSteps) {
   EXPECT_NEAR(gradient[0], 0.0, 1e-14);
   EXPECT_NEAR(gradient[1], 0.0, 1e-14);
   EXPECT_GT(std::abs(x_star[0]), 0.1);
+}
+
+TEST(NashEquilibrium, MovesWithTheCosts) {
+  constexpr Real h = 1e-4;
+  testing::RandomNumbers random(7);
+  for (const auto& recipe : assorted_recipes()) {
+    const Parameters parameters = parse_game(toml_of(random_game(recipe))).parameters;
+    const auto& cost = static_cast<const QuadraticCost&>(*parameters.cost);
+    QuadraticCost direction(parameters.shape.players, parameters.shape.dimension);
+    random.fill(direction.quadratic, -1.0, 1.0);
+    random.fill(direction.linear, -1.0, 1.0);
+    random.fill(direction.coupling, -1.0, 1.0);
+    for (int i = 0; i < parameters.shape.players; ++i) {
+      direction.coupling[at(i) * at(parameters.shape.players) + at(i)] = 0.0;
+    }
+    direction.refresh();
+    const auto moved = [&](Real s) {
+      QuadraticCost other = cost;
+      for (const auto member : {&QuadraticCost::quadratic, &QuadraticCost::linear, &QuadraticCost::coupling}) {
+        for (std::size_t k = 0; k < (other.*member).size(); ++k) (other.*member)[k] += s * (direction.*member)[k];
+      }
+      other.refresh();
+      return nash_equilibrium(other, parameters.shape);
+    };
+    const std::vector<Real> forward = moved(h);
+    const std::vector<Real> backward = moved(-h);
+    const std::vector<Real> x_star = nash_equilibrium(cost, parameters.shape);
+    const std::vector<Real> along = nash_equilibrium_along(cost, direction, parameters.shape, x_star);
+    for (std::size_t p = 0; p < along.size(); ++p) {
+      EXPECT_NEAR(along[p], (forward[p] - backward[p]) / (2.0 * h), 1e-7) << "seed " << recipe.seed;
+    }
+  }
 }
 
 TEST(StrongMonotonicity, IsTheSmallestEigenvalueOfTheSymmetricPart) {

@@ -51,6 +51,15 @@ TEST_F(Measures, ConsensusErrorComparesEstimatesWithSharedSignals) {
   EXPECT_NEAR(consensus_error(loop_, state.data(), signals), std::sqrt(squares), 1e-13 * std::sqrt(squares));
 }
 
+TEST(NashError, MovesAlongADirection) {
+  const Real x[] = {3.0, 4.0};
+  const Real x_star[] = {0.0, 0.0};
+  const Real x_along[] = {1.0, 0.5};
+  const Real x_star_along[] = {-1.0, 0.0};
+  EXPECT_NEAR(nash_error_along(x, x_star, x_along, x_star_along, 2), (3.0 * 2.0 + 4.0 * 0.5) / 5.0, 1e-15);
+  EXPECT_EQ(nash_error_along(x, x, x_along, x_star_along, 2), 0.0) << "at the equilibrium";
+}
+
 TEST_F(Measures, GradientNormIsThatOfThePseudoGradientAtX) {
   Real squares = 0.0;
   for (std::size_t i = 0; i < 3; ++i) {
