@@ -2,25 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
-#include <limits>
-
-#include "equilibrium.hpp"
-#include "loop_jacobian.hpp"
-#include "measures.hpp"
 
 namespace mixed_order_game {
 
 namespace {
-
-// Importers form communication points by t += h or n * h: both stray by rounding, of t and of h.
-Real time_tolerance(Real t, Real h) {
-  return 64.0 * std::numeric_limits<Real>::epsilon() * std::fabs(t) + 1e-9 * std::fabs(h);
-}
-
-bool same_bits(std::span<const Real> a, std::span<const Real> b) {
-  return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size_bytes()) == 0;
-}
 
 std::string_view name_of(Type type) {
   switch (type) {
@@ -56,14 +41,14 @@ void require_finite(Real value, const std::string& name) {
 Instance::Instance(Model model)
     : model_(std::move(model)),
       settings_(model_.game),
-      loop_(model_.game.parameters),
-      input_(model_.game.parameters.shape.actions()),
-      initial_state_(at(loop_.layout().size())),
-      initial_modes_(at(loop_.shape().actions())),
-      signals_(loop_.shape()),
-      rate_(initial_state_.size()),
-      control_rate_(at(loop_.shape().actions())),
-      d_ext_(at(loop_.shape().actions())) {}
+      evaluation_(model_.game),
+      initial_state_(at(evaluation_.loop().layout().size())),
+      initial_modes_(at(evaluation_.loop().shape().actions())) {}
+
+Standing Instance::standing() const {
+  if (co_simulation_) return co_simulation_->standing();
+  return {.time = experiment_.start_time, .state = initial_state_.data(), .modes = &initial_modes_, .statistics = {}};
+}
 
 void Instance::setup_experiment(const Experiment& experiment) {
   if (!std::isfinite(experiment.start_time)) {
@@ -78,33 +63,34 @@ void Instance::setup_experiment(const Experiment& experiment) {
                 text_of(experiment.start_time) + ", the start time");
   }
   experiment_ = experiment;
-  signals_valid_ = false;
+  evaluation_.moved();
 }
 
 void Instance::enter_initialization() { phase_ = Phase::initialization; }
 
 void Instance::exit_initialization() {
   check_settings();
-  prepare(Stage::signals);
-  if (!std::all_of(rate_.begin(), rate_.end(), [](Real rate) { return std::isfinite(rate); })) {
+  act();
+  evaluation_.prepare_signals(standing());
+  const AlignedVector& rate = evaluation_.rate();
+  if (!std::all_of(rate.begin(), rate.end(), [](Real value) { return std::isfinite(value); })) {
     throw Error("the initial rates are not finite: the parameters or initial values are too large");
   }
-  auto integrator = std::make_unique<Integrator>(loop_, input_, make_newton_solver(loop_.shape()));
-  integrator->start(experiment_.start_time, tolerances());
-  applied_ = model_.variables.save(settings_);
-  integrator_ = std::move(integrator);
-  touched_ = false;
-  state_valid_ = signals_valid_ = control_rates_valid_ = false;
+  auto run = std::make_unique<CoSimulation>(evaluation_);
+  run->start(experiment_.start_time, tolerances(), model_.variables.save(settings_));
+  co_simulation_ = std::move(run);
+  evaluation_.moved();
   phase_ = Phase::step_complete;
 }
 
 void Instance::reset() {
   settings_ = Settings(model_.game);
   experiment_ = {};
-  integrator_.reset();
-  applied_.clear();
-  touched_ = failed_ = false;
-  state_valid_ = signals_valid_ = control_rates_valid_ = equilibrium_valid_ = false;
+  co_simulation_.reset();
+  touched_ = true;
+  failed_ = false;
+  evaluation_.moved();
+  evaluation_.costs_changed();
   phase_ = Phase::instantiated;
 }
 
@@ -122,31 +108,14 @@ int Instance::known(std::uint32_t reference, Type type) const {
   return number;
 }
 
-View Instance::view() const {
-  View view;
-  view.settings = &settings_;
-  view.loop = &loop_;
-  view.time = time();
-  view.d_ext = d_ext_.data();
-  view.state = integrator_ ? integrator_->state() : initial_state_.data();
-  view.rate = rate_.data();
-  view.signals = &signals_;
-  view.control_rate = control_rate_.data();
-  view.x_star = x_star_.data();
-  view.statistics = statistics();
-  return view;
-}
-
 void Instance::get(Type type, std::span<const std::uint32_t> references, Real* values) {
   const ModelVariables& variables = model_.variables;
-  bool needed[static_cast<std::size_t>(Stage::equilibrium) + 1] = {};
+  Stages needed{};
   for (const std::uint32_t reference : references) {
     needed[static_cast<std::size_t>(variables.family(known(reference, type)).stage)] = true;
   }
-  for (const Stage stage : {Stage::state, Stage::signals, Stage::equilibrium, Stage::input}) {
-    if (needed[static_cast<std::size_t>(stage)]) prepare(stage);
-  }
-  const View source = view();
+  prepare(needed);
+  const View source = evaluation_.view(settings_, standing());
   scratch_.resize(references.size());
   for (std::size_t k = 0; k < references.size(); ++k) {
     const auto reference = static_cast<int>(references[k]);
@@ -180,9 +149,7 @@ void Instance::set(Type type, std::span<const std::uint32_t> references, const R
 
 void Instance::settings_changed(bool equilibrium_moved) {
   touched_ = true;
-  if (equilibrium_moved) equilibrium_valid_ = false;
-  // a run's outputs change with its next step, those of an instance that does not run yet change at once
-  if (!integrator_) state_valid_ = signals_valid_ = false;
+  if (equilibrium_moved) evaluation_.costs_changed();
 }
 
 void Instance::set_input_derivatives(std::span<const std::uint32_t> references, const int* orders, const Real* values) {
@@ -214,7 +181,7 @@ void Instance::set_input_derivative(int slot, int order, Real value) {
   constexpr int highest = ExternalDisturbance::highest_derivative;
   static_assert(highest == 3);
   ExternalDisturbance& input = settings_.input;
-  const Real t = time();
+  const Real t = standing().time;
   const auto polynomial = [&] { return input.numbers().subspan(at(slot) * (highest + 2), highest + 2); };
   const auto is_constant = [&] {
     return std::all_of(polynomial().begin() + 1, polynomial().begin() + highest + 1, [](Real c) { return c == 0.0; });
@@ -245,9 +212,13 @@ void Instance::get_output_derivatives(std::span<const std::uint32_t> references,
                   std::to_string(highest_output_derivative));
     }
   }
-  prepare_control_rates();
-  for (const std::uint32_t reference : references) prepare(variables.family(static_cast<int>(reference)).stage);
-  const View source = view();
+  Stages needed{};
+  for (const std::uint32_t reference : references) {
+    needed[static_cast<std::size_t>(variables.family(static_cast<int>(reference)).stage)] = true;
+  }
+  prepare(needed);
+  evaluation_.prepare_control_rates(standing());
+  const View source = evaluation_.view(settings_, standing());
   scratch_.resize(references.size());
   for (std::size_t k = 0; k < references.size(); ++k) {
     const auto reference = static_cast<int>(references[k]);
@@ -257,77 +228,20 @@ void Instance::get_output_derivatives(std::span<const std::uint32_t> references,
   std::copy(scratch_.begin(), scratch_.end(), values);
 }
 
-void Instance::prepare(Stage stage) {
-  switch (stage) {
-    case Stage::settings:
-      break;
-    case Stage::input:
-      settings_.input.values(time(), d_ext_.data());
-      break;
-    case Stage::state:
-      prepare_state();
-      break;
-    case Stage::signals:
-      prepare_signals();
-      break;
-    case Stage::equilibrium:
-      prepare_state();
-      prepare_equilibrium();
-      break;
+/// The settings act: at once as long as nothing runs, from the next step on in a run.
+void Instance::act() {
+  if (co_simulation_ || !touched_) return;
+  evaluation_.act(settings_);
+  evaluation_.loop().initial_state(initial_state_.data());
+  touched_ = false;
+}
+
+void Instance::prepare(const Stages& needed) {
+  const auto is_needed = [&](Stage stage) { return needed[static_cast<std::size_t>(stage)]; };
+  if (is_needed(Stage::state) || is_needed(Stage::signals) || is_needed(Stage::equilibrium)) act();
+  for (const Stage stage : {Stage::input, Stage::signals, Stage::equilibrium}) {
+    if (is_needed(stage)) evaluation_.prepare(stage, settings_, standing());
   }
-}
-
-void Instance::hand_over(const Settings& settings) {
-  loop_.parameters() = settings.parameters;
-  loop_.refresh();
-  input_ = settings.input;
-}
-
-void Instance::prepare_state() {
-  if (integrator_ || state_valid_) return;
-  hand_over(settings_);
-  loop_.initial_state(initial_state_.data());
-  state_valid_ = true;
-}
-
-void Instance::prepare_signals() {
-  prepare_state();
-  if (signals_valid_) return;
-  const View source = view();
-  input_.values(source.time, d_ext_.data());
-  loop_.evaluate(source.time, source.state, d_ext_.data(), integrator_ ? integrator_->modes() : initial_modes_,
-                 signals_, rate_.data());
-  signals_valid_ = true;
-}
-
-void Instance::prepare_equilibrium() {
-  if (equilibrium_valid_) return;
-  settings_.parameters.cost->refresh();
-  x_star_ = nash_equilibrium(*settings_.parameters.cost, settings_.parameters.shape);
-  equilibrium_valid_ = true;
-}
-
-// u depends on the state alone, so that u' = (d u / d state) state'; of the loop's Jacobian, the rows of the driven
-// states hold d (u + g) / d state.
-void Instance::prepare_control_rates() {
-  prepare_signals();
-  if (control_rates_valid_) return;
-  const View source = view();
-  const StateLayout& layout = loop_.layout();
-  LoopJacobian jacobian(loop_);
-  jacobian.linearize(source.state, signals_, integrator_ ? integrator_->modes() : initial_modes_);
-  AlignedVector product(rate_.size());
-  jacobian.multiply(rate_.data(), product.data());
-  const SparseRows& pattern = loop_.parameters().dynamics->jacobian_pattern();
-  for (int p = 0; p < loop_.shape().actions(); ++p) {
-    const bool second = loop_.shape().is_second_order(loop_.shape().player_of(p));
-    Real dynamics_rate = 0.0;
-    for (int k = pattern.start[at(p)]; k < pattern.start[at(p + 1)]; ++k) {
-      dynamics_rate += jacobian.dynamics[at(k)] * rate_[at(layout.x() + pattern.column[at(k)])];
-    }
-    control_rate_[at(p)] = product[at((second ? layout.reference() : layout.x()) + p)] - dynamics_rate;
-  }
-  control_rates_valid_ = true;
 }
 
 Tolerances Instance::tolerances() const {
@@ -345,54 +259,25 @@ void Instance::check_settings() {
     throw Error("the weights a[i,j] leave the players in separate groups " + groups(graph) +
                 ", expected a connected graph, or allow_disconnected = true");
   }
-  prepare_equilibrium();
-}
-
-Instance::Change Instance::judge_changes() {
-  if (!touched_) return Change::none;
-  const std::vector<Real> numbers = model_.variables.save(settings_);
-  if (same_bits(numbers, applied_)) {
-    touched_ = false;
-    return Change::none;
-  }
-  const std::size_t parameters = model_.variables.saved_parameters();
-  if (same_bits(std::span(numbers).first(parameters), std::span(applied_).first(parameters))) return Change::input;
-  check_settings();
-  return Change::parameters;
-}
-
-void Instance::apply(Change change) {
-  if (change == Change::none) return;
-  if (change == Change::parameters) {
-    hand_over(settings_);
-  } else {
-    input_ = settings_.input;
-  }
-  applied_ = model_.variables.save(settings_);
-  touched_ = false;
-  integrator_->restart(change == Change::parameters);
+  evaluation_.prepare_equilibrium(settings_);
 }
 
 void Instance::do_step(Real t, Real h) {
-  const Real now = integrator_->time();
-  if (!(h > 0.0) || !std::isfinite(h)) {
-    throw Error("the step size is " + text_of(h) + ", expected a positive finite number");
+  const Real end = co_simulation_->end_of_step(t, h, experiment_.stop_time);
+  Change change = Change::none;
+  std::vector<Real> numbers;
+  if (touched_) {
+    numbers = model_.variables.save(settings_);
+    change = co_simulation_->change_to(numbers, model_.variables.saved_parameters());
+    if (change == Change::parameters) check_settings();
   }
-  if (!std::isfinite(t) || !(std::fabs(t - now) <= time_tolerance(std::max(std::fabs(t), std::fabs(now)), h))) {
-    throw Error("the communication point is " + text_of(t) + ", expected " + text_of(now) +
-                ", where the last step ended");
-  }
-  const Real end = std::max(t + h, now);
-  if (!std::isfinite(end)) throw Error("the step ends at " + text_of(end) + ", expected a finite time");
-  if (experiment_.stop_time && end > *experiment_.stop_time + time_tolerance(end, h)) {
-    throw Error("the step from " + text_of(t) + " by " + text_of(h) + " ends after the stop time " +
-                text_of(*experiment_.stop_time));
-  }
-  const Change change = judge_changes();
-  signals_valid_ = control_rates_valid_ = false;
+  touched_ = false;
+  evaluation_.moved();
   try {
-    apply(change);
-    integrator_->advance(end);
+    if (change == Change::parameters) evaluation_.act(settings_);
+    if (change == Change::input) evaluation_.act(settings_.input);
+    if (change != Change::none) co_simulation_->settings_act(change, std::move(numbers));
+    co_simulation_->advance(end);
   } catch (const std::exception& error) {
     phase_ = Phase::error;
     failed_ = true;
@@ -406,10 +291,7 @@ Snapshot Instance::save() const {
   snapshot.phase = phase_;
   snapshot.experiment = experiment_;
   snapshot.settings = model_.variables.save(settings_);
-  if (integrator_) {
-    snapshot.applied = applied_;
-    snapshot.checkpoint = integrator_->checkpoint();
-  }
+  if (co_simulation_) snapshot.co_simulation = co_simulation_->save();
   return snapshot;
 }
 
@@ -418,38 +300,34 @@ SnapshotSizes Instance::snapshot_sizes() const {
 }
 
 bool Instance::restore(const Snapshot& snapshot) {
-  const ModelVariables& variables = model_.variables;
-  variables.load(snapshot.settings, settings_);
+  model_.variables.load(snapshot.settings, settings_);
   experiment_ = snapshot.experiment;
+  touched_ = true;
   failed_ = false;
-  state_valid_ = signals_valid_ = control_rates_valid_ = equilibrium_valid_ = false;
-  if (!snapshot.checkpoint) {
-    integrator_.reset();
-    applied_.clear();
-    touched_ = false;
-    phase_ = snapshot.phase;
-    return true;
-  }
-  applied_ = snapshot.applied;
-  touched_ = !same_bits(applied_, snapshot.settings);
-  if (touched_) {
-    Settings applied(model_.game);
-    variables.load(applied_, applied);
-    hand_over(applied);
-  } else {
-    hand_over(settings_);
-  }
-  if (!integrator_) integrator_ = std::make_unique<Integrator>(loop_, input_, make_newton_solver(loop_.shape()));
+  evaluation_.moved();
+  evaluation_.costs_changed();
   bool repeated = true;
+  if (snapshot.co_simulation) {
+    repeated = restore(*snapshot.co_simulation);
+  } else {
+    co_simulation_.reset();
+  }
+  phase_ = snapshot.phase;
+  return repeated;
+}
+
+bool Instance::restore(const CoSimulation::Point& point) {
+  Settings acting(model_.game);
+  model_.variables.load(point.acting, acting);
+  evaluation_.act(acting);
+  if (!co_simulation_) co_simulation_ = std::make_unique<CoSimulation>(evaluation_);
   try {
-    repeated = integrator_->restore(*snapshot.checkpoint, tolerances());
+    return co_simulation_->restore(point, tolerances());
   } catch (...) {
     phase_ = Phase::error;
     failed_ = true;
     throw;
   }
-  phase_ = snapshot.phase;
-  return repeated;
 }
 
 }  // namespace mixed_order_game

@@ -4,13 +4,16 @@
 // the integration failed, and then the instance is in the error state.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <span>
 #include <string>
 #include <vector>
 
+#include "co_simulation.hpp"
 #include "errors.hpp"
+#include "evaluation.hpp"
 #include "lifecycle.hpp"
 #include "model.hpp"
 #include "settings.hpp"
@@ -27,8 +30,8 @@ class Instance {
   [[nodiscard]] const Model& model() const { return model_; }
   [[nodiscard]] Phase phase() const { return phase_; }
   /// Time of the last communication point, s.
-  [[nodiscard]] Real time() const { return integrator_ ? integrator_->time() : experiment_.start_time; }
-  [[nodiscard]] Statistics statistics() const { return integrator_ ? integrator_->statistics() : Statistics{}; }
+  [[nodiscard]] Real time() const { return standing().time; }
+  [[nodiscard]] Statistics statistics() const { return standing().statistics; }
 
   void setup_experiment(const Experiment& experiment);
   void enter_initialization();
@@ -51,50 +54,28 @@ class Instance {
   [[nodiscard]] SnapshotSizes snapshot_sizes() const;
 
  private:
+  using Stages = std::array<bool, static_cast<std::size_t>(Stage::equilibrium) + 1>;
+
   [[nodiscard]] int known(std::uint32_t reference, Type type) const;
+  [[nodiscard]] Standing standing() const;
   [[nodiscard]] Tolerances tolerances() const;
-  [[nodiscard]] View view() const;
-  void prepare(Stage stage);
-  void prepare_state();
-  void prepare_signals();
-  void prepare_equilibrium();
-  void prepare_control_rates();
+  void act();
+  void prepare(const Stages& needed);
   void settings_changed(bool equilibrium_moved);
   void set_input_derivative(int slot, int order, Real value);
   void check_settings();
-
-  /// What differs, bit for bit, between the settings and those that the integrator works with.
-  enum class Change { none, input, parameters };
-  Change judge_changes();
-  void apply(Change change);
-  /// Hands settings on to the loop and the input that the integrator reads.
-  void hand_over(const Settings& settings);
+  bool restore(const CoSimulation::Point& point);
 
   Model model_;
   Phase phase_ = Phase::instantiated;
   bool failed_ = false;
   Experiment experiment_;
-  Settings settings_;  // as the importer set them
-
-  // as the integrator knows them
-  ClosedLoop loop_;
-  ExternalDisturbance input_;
-  std::vector<Real> applied_;  // their numbers, once the run has begun
-  std::unique_ptr<Integrator> integrator_;
-  bool touched_ = false;  // settings_ may differ from applied_
-
-  // computed when asked for
-  bool state_valid_ = false;
-  bool signals_valid_ = false;
-  bool control_rates_valid_ = false;
-  bool equilibrium_valid_ = false;
+  Settings settings_;    // as the importer set them
+  bool touched_ = true;  // they may differ from those that act
+  Evaluation evaluation_;
   AlignedVector initial_state_;
   Modes initial_modes_;
-  Signals signals_;
-  AlignedVector rate_;
-  AlignedVector control_rate_;
-  AlignedVector d_ext_;
-  std::vector<Real> x_star_;
+  std::unique_ptr<CoSimulation> co_simulation_;  // once the run has begun
   std::vector<Real> scratch_;
 };
 

@@ -129,10 +129,10 @@ void write_payload(Writer& writer, const Snapshot& snapshot) {
   writer.number(snapshot.experiment.start_time);
   writer.optional(snapshot.experiment.stop_time);
   writer.numbers(snapshot.settings);
-  writer.byte(snapshot.checkpoint ? 1 : 0);
-  if (!snapshot.checkpoint) return;
-  const Checkpoint& checkpoint = *snapshot.checkpoint;
-  writer.numbers(snapshot.applied);
+  writer.byte(snapshot.co_simulation ? 1 : 0);
+  if (!snapshot.co_simulation) return;
+  const auto& [acting, checkpoint] = *snapshot.co_simulation;
+  writer.numbers(acting);
   writer.number(checkpoint.restart_time);
   writer.numbers(checkpoint.restart_state);
   write_modes(writer, checkpoint.restart_modes);
@@ -182,11 +182,12 @@ Checkpoint read_checkpoint(Reader& reader, const SnapshotSizes& sizes) {
 std::size_t serialized_size(const Snapshot& snapshot, std::string_view guid) {
   // phase, experiment, settings, flag
   std::size_t size = 1 + 9 + 8 + 9 + 8 + 8 * snapshot.settings.size() + 1;
-  if (const auto& checkpoint = snapshot.checkpoint) {
+  if (snapshot.co_simulation) {
+    const auto& [acting, checkpoint] = *snapshot.co_simulation;
     constexpr std::size_t statistics = 5 * 8;
-    size += 8 + 8 * snapshot.applied.size() + 8;
-    size += 8 + 8 * checkpoint->restart_state.size() + 8 + checkpoint->restart_modes.size() + statistics + 8;
-    size += 8 + 8 + 8 * checkpoint->state.size() + 8 + checkpoint->modes.size() + statistics;
+    size += 8 + 8 * acting.size() + 8;
+    size += 8 + 8 * checkpoint.restart_state.size() + 8 + checkpoint.restart_modes.size() + statistics + 8;
+    size += 8 + 8 + 8 * checkpoint.state.size() + 8 + checkpoint.modes.size() + statistics;
   }
   return magic.size() + 4 + 4 + guid.size() + 8 + size + fingerprint_size;
 }
@@ -229,11 +230,12 @@ Snapshot from_bytes(std::span<const char> bytes, std::string_view guid, const Sn
   snapshot.experiment.stop_time = reader.optional();
   reader.numbers(sizes.settings, snapshot.settings);
   if (reader.boolean()) {
-    reader.numbers(sizes.settings, snapshot.applied);
-    snapshot.checkpoint = read_checkpoint(reader, sizes);
+    CoSimulation::Point& point = snapshot.co_simulation.emplace();
+    reader.numbers(sizes.settings, point.acting);
+    point.checkpoint = read_checkpoint(reader, sizes);
   }
   const bool has_run = snapshot.phase == Phase::step_complete || snapshot.phase == Phase::terminated;
-  if (snapshot.phase == Phase::error || has_run != snapshot.checkpoint.has_value()) {
+  if (snapshot.phase == Phase::error || has_run != snapshot.co_simulation.has_value()) {
     Reader::refuse("its phase and content do not match");
   }
   if (reader.left() != fingerprint_size) Reader::refuse("they are longer than their content");

@@ -8,7 +8,7 @@
 #include <string_view>
 #include <vector>
 
-#include "integrator.hpp"
+#include "co_simulation.hpp"
 #include "lifecycle.hpp"
 
 namespace mixed_order_game {
@@ -23,10 +23,8 @@ struct Experiment {
 struct Snapshot {
   Phase phase = Phase::instantiated;
   Experiment experiment;
-  std::vector<Real> settings;  ///< as ModelVariables::save gives them
-  /// Once the run has begun: the settings that the integrator works with, and where it stands.
-  std::vector<Real> applied;
-  std::optional<Checkpoint> checkpoint;
+  std::vector<Real> settings;                        ///< as ModelVariables::save gives them
+  std::optional<CoSimulation::Point> co_simulation;  ///< once the run has begun
 };
 
 /// The lengths that a snapshot of one model has.

@@ -1,0 +1,72 @@
+#include "co_simulation.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <limits>
+
+#include "errors.hpp"
+#include "model_variables.hpp"
+
+namespace mixed_order_game {
+
+namespace {
+
+// Importers form communication points by t += h or n * h: both stray by rounding, of t and of h.
+Real time_tolerance(Real t, Real h) {
+  return 64.0 * std::numeric_limits<Real>::epsilon() * std::fabs(t) + 1e-9 * std::fabs(h);
+}
+
+bool same_bits(std::span<const Real> a, std::span<const Real> b) {
+  return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size_bytes()) == 0;
+}
+
+}  // namespace
+
+CoSimulation::CoSimulation(const Evaluation& evaluation)
+    : integrator_(evaluation.loop(), evaluation.input(), make_newton_solver(evaluation.loop().shape())) {}
+
+void CoSimulation::start(Real t, Tolerances tolerances, std::vector<Real> acting) {
+  integrator_.start(t, tolerances);
+  acting_ = std::move(acting);
+}
+
+Standing CoSimulation::standing() const {
+  return {integrator_.time(), integrator_.state(), &integrator_.modes(), integrator_.statistics()};
+}
+
+Change CoSimulation::change_to(std::span<const Real> settings, std::size_t parameters) const {
+  if (same_bits(settings, acting_)) return Change::none;
+  return same_bits(settings.first(parameters), std::span(acting_).first(parameters)) ? Change::input
+                                                                                     : Change::parameters;
+}
+
+void CoSimulation::settings_act(Change change, std::vector<Real> acting) {
+  acting_ = std::move(acting);
+  integrator_.restart(change == Change::parameters);
+}
+
+Real CoSimulation::end_of_step(Real t, Real h, std::optional<Real> stop_time) const {
+  const Real now = integrator_.time();
+  if (!(h > 0.0) || !std::isfinite(h)) {
+    throw Error("the step size is " + text_of(h) + ", expected a positive finite number");
+  }
+  if (!std::isfinite(t) || !(std::fabs(t - now) <= time_tolerance(std::max(std::fabs(t), std::fabs(now)), h))) {
+    throw Error("the communication point is " + text_of(t) + ", expected " + text_of(now) +
+                ", where the last step ended");
+  }
+  const Real end = std::max(t + h, now);
+  if (!std::isfinite(end)) throw Error("the step ends at " + text_of(end) + ", expected a finite time");
+  if (stop_time && end > *stop_time + time_tolerance(end, h)) {
+    throw Error("the step from " + text_of(t) + " by " + text_of(h) + " ends after the stop time " +
+                text_of(*stop_time));
+  }
+  return end;
+}
+
+bool CoSimulation::restore(const Point& point, Tolerances tolerances) {
+  acting_ = point.acting;
+  return integrator_.restore(point.checkpoint, tolerances);
+}
+
+}  // namespace mixed_order_game

@@ -1,0 +1,63 @@
+// The closed loop under the settings that act now, and what is computed from it only when a variable asks for it.
+#pragma once
+
+#include "closed_loop.hpp"
+#include "external_disturbance.hpp"
+#include "settings.hpp"
+
+namespace mixed_order_game {
+
+/// Where a run stands.
+struct Standing {
+  Real time = 0.0;
+  const Real* state = nullptr;
+  const Modes* modes = nullptr;
+  Statistics statistics;
+};
+
+class Evaluation {
+ public:
+  explicit Evaluation(const Game& game);
+  Evaluation(const Evaluation&) = delete;  // integrators refer to its members
+  Evaluation& operator=(const Evaluation&) = delete;
+
+  [[nodiscard]] const ClosedLoop& loop() const { return loop_; }
+  [[nodiscard]] const ExternalDisturbance& input() const { return input_; }
+
+  /// These settings, or this input, act from here on.
+  void act(const Settings& settings);
+  void act(const ExternalDisturbance& input);
+  /// The run stands somewhere else, or goes on from another run.
+  void moved() { signals_valid_ = control_rates_valid_ = false; }
+  /// The costs, whose equilibrium is asked for, are others.
+  void costs_changed() { equilibrium_valid_ = false; }
+
+  /// Computes what the variables of a stage need.
+  void prepare(Stage stage, Settings& settings, const Standing& standing);
+  void prepare_signals(const Standing& standing);
+  /// u' for the derivatives of outputs.
+  void prepare_control_rates(const Standing& standing);
+  /// Throws GameError when the game has no unique equilibrium.
+  void prepare_equilibrium(Settings& settings);
+
+  /// Signals and rates that prepare_signals found.
+  [[nodiscard]] const Signals& signals() const { return signals_; }
+  [[nodiscard]] const AlignedVector& rate() const { return rate_; }
+  [[nodiscard]] View view(const Settings& settings, const Standing& standing) const;
+
+ private:
+  ClosedLoop loop_;
+  ExternalDisturbance input_;
+
+  bool signals_valid_ = false;
+  bool control_rates_valid_ = false;
+  bool equilibrium_valid_ = false;
+  Signals signals_;
+  AlignedVector rate_;
+  AlignedVector control_rate_;
+  AlignedVector d_ext_;  // that acts
+  AlignedVector d_ext_as_set_;
+  std::vector<Real> x_star_;
+};
+
+}  // namespace mixed_order_game
