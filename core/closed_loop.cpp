@@ -13,8 +13,7 @@ ClosedLoop::ClosedLoop(Parameters parameters) : parameters_(std::move(parameters
 
 void ClosedLoop::refresh() { parameters_.refresh(); }
 
-void ClosedLoop::initial_state(Real* state) const {
-  const InitialState& initial = parameters_.initial;
+void ClosedLoop::initial_state(const InitialState& initial, Real* state) const {
   std::copy(initial.x.begin(), initial.x.end(), state + layout_.x());
   std::copy(initial.reference.begin(), initial.reference.end(), state + layout_.reference());
   std::copy(initial.y.begin(), initial.y.end(), state + layout_.estimates());

@@ -25,7 +25,9 @@ class ClosedLoop {
   [[nodiscard]] const StateLayout& layout() const { return layout_; }
 
   /// state[size()] at the start of a run, from x0, z0, v0, y0 and W = 0.
-  void initial_state(Real* state) const;
+  void initial_state(Real* state) const { initial_state(parameters_.initial, state); }
+  /// The same from other values, such as those of a direction.
+  void initial_state(const InitialState& initial, Real* state) const;
 
   /// The part of the signals that every player computes from its own state and estimates: xbar, gradient, error,
   /// activations, network and robust term.

@@ -101,12 +101,12 @@ std::vector<Real> nash_equilibrium(const Cost& cost, const Shape& shape) {
 
 // P(x*) = 0 at every cost, so that (dP/dx) dx* = -dP, the change of P at a fixed x
 std::vector<Real> nash_equilibrium_along(const Cost& cost, const Cost& direction, const Shape& shape,
-                                         const std::vector<Real>& x_star) {
+                                         const Real* x_star) {
   const SparseRows& pattern = cost.hessian_pattern();
   std::vector<Real> hessian(at(pattern.entries()));
   std::vector<Real> along(at(shape.actions()));
-  cost.hessian_rows(x_star.data(), 0, hessian.data());
-  cost.own_gradients_along(direction, x_star.data(), 0, along.data());
+  cost.hessian_rows(x_star, 0, hessian.data());
+  cost.own_gradients_along(direction, x_star, 0, along.data());
   for (Real& entry : along) entry = -entry;
   solve_in_place(independent_groups(pattern), pattern, hessian, along);
   return along;

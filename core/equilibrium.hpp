@@ -15,7 +15,7 @@ std::vector<Real> nash_equilibrium(const Cost& cost, const Shape& shape);
 /// The derivative of x* with respect to the cost's coefficients, along those of a direction. Throws as
 /// nash_equilibrium().
 std::vector<Real> nash_equilibrium_along(const Cost& cost, const Cost& direction, const Shape& shape,
-                                         const std::vector<Real>& x_star);
+                                         const Real* x_star);
 
 /// The largest m with (x - z)'(P(x) - P(z)) >= m |x - z|^2: the smallest eigenvalue of the symmetric part of the
 /// Jacobian of P, at x = 0 (which is everywhere for quadratic costs).

@@ -23,6 +23,13 @@ void LoopTangent::follow_state(const LoopJacobian& jacobian) {
   jacobian.multiply(state.data(), rate.data(), control.data());
 }
 
+void LoopTangent::follow_parameters(const LoopJacobian& jacobian, const Parameters& direction, Real t,
+                                    const Real* initial_state, const Signals& signals) {
+  loop_->initial_state(direction.initial, state.data());
+  follow_state(jacobian);
+  add_parameters(direction, t, initial_state, signals);
+}
+
 void LoopTangent::add_input(const Real* d_ext) {
   for (int p = 0; p < loop_->shape().actions(); ++p) rate[driven(p)] += d_ext[p];
 }

@@ -19,15 +19,18 @@ class LoopTangent {
   /// Sets control and rate along state; the Jacobian must be linearized.
   void follow_state(const LoopJacobian& jacobian);
 
+  /// Sets state, control and rate along parameters at the start of a run, where all weights are zero; the signals are
+  /// those of ClosedLoop::evaluate, to which the Jacobian belongs, too.
+  void follow_parameters(const LoopJacobian& jacobian, const Parameters& direction, Real t, const Real* initial_state,
+                         const Signals& signals);
+
   /// Adds to rate the change along d_ext, at entry(i, l), and along time.
   void add_input(const Real* d_ext);
   void add_time(Real t, Real change);
 
-  /// Adds the change along parameters at a fixed state in which all weights are zero, as at the start of a run; the
-  /// signals are those of ClosedLoop::evaluate. What moves the initial state itself belongs into state.
-  void add_parameters(const Parameters& direction, Real t, const Real* initial_state, const Signals& signals);
-
  private:
+  /// Adds what changes with parameters at a fixed state.
+  void add_parameters(const Parameters& direction, Real t, const Real* initial_state, const Signals& signals);
   /// Where u + g + d enters: x' for players of order 1, v' for those of order 2.
   [[nodiscard]] std::size_t driven(int p) const;
 

@@ -25,6 +25,7 @@ class PolynomialDynamics final : public UnknownDynamics {
   void values(const Real* x, Real* g) const override;
   [[nodiscard]] const SparseRows& jacobian_pattern() const override { return pattern_; }
   void jacobian(const Real* x, Real* values) const override;
+  [[nodiscard]] bool is_constant(int entry) const override { return square_[at(entry)] == 0.0; }
   [[nodiscard]] std::unique_ptr<UnknownDynamics> zero_direction() const override;
   void values_along(const UnknownDynamics& direction, const Real* x, Real* derivative) const override;
 

@@ -21,6 +21,8 @@ class UnknownDynamics {
 
   /// The entries of jacobian_pattern() at x.
   virtual void jacobian(const Real* x, Real* values) const = 0;
+  /// Whether an entry of jacobian_pattern() is the same at every x.
+  [[nodiscard]] virtual bool is_constant(int entry) const = 0;
 
   /// The same family with every coefficient that can change zero, for the coefficients of a direction.
   [[nodiscard]] virtual std::unique_ptr<UnknownDynamics> zero_direction() const = 0;

@@ -1,7 +1,6 @@
 #include "evaluation.hpp"
 
 #include "equilibrium.hpp"
-#include "loop_jacobian.hpp"
 
 namespace mixed_order_game {
 
@@ -10,7 +9,7 @@ Evaluation::Evaluation(const Game& game)
       input_(game.parameters.shape.actions()),
       signals_(loop_.shape()),
       rate_(at(loop_.layout().size())),
-      control_rate_(at(loop_.shape().actions())),
+      jacobian_(loop_),
       d_ext_(at(loop_.shape().actions())),
       d_ext_as_set_(at(loop_.shape().actions())) {}
 
@@ -49,26 +48,13 @@ void Evaluation::prepare_signals(const Standing& standing) {
   signals_valid_ = true;
 }
 
-// u depends on the state alone, so that u' = (d u / d state) state'; of the loop's Jacobian, the rows of the driven
-// states hold d (u + g) / d state.
-void Evaluation::prepare_control_rates(const Standing& standing) {
-  prepare_signals(standing);
-  if (control_rates_valid_) return;
-  const StateLayout& layout = loop_.layout();
-  LoopJacobian jacobian(loop_);
-  jacobian.linearize(standing.state, signals_, *standing.modes);
-  AlignedVector product(rate_.size());
-  jacobian.multiply(rate_.data(), product.data());
-  const SparseRows& pattern = loop_.parameters().dynamics->jacobian_pattern();
-  for (int p = 0; p < loop_.shape().actions(); ++p) {
-    const bool second = loop_.shape().is_second_order(loop_.shape().player_of(p));
-    Real dynamics_rate = 0.0;
-    for (int k = pattern.start[at(p)]; k < pattern.start[at(p + 1)]; ++k) {
-      dynamics_rate += jacobian.dynamics[at(k)] * rate_[at(layout.x() + pattern.column[at(k)])];
-    }
-    control_rate_[at(p)] = product[at((second ? layout.reference() : layout.x()) + p)] - dynamics_rate;
+const LoopJacobian& Evaluation::linearize(const Standing& standing) {
+  if (!linearized_) {
+    jacobian_.refresh();
+    jacobian_.linearize(standing.state, signals_, *standing.modes);
+    linearized_ = true;
   }
-  control_rates_valid_ = true;
+  return jacobian_;
 }
 
 void Evaluation::prepare_equilibrium(Settings& settings) {
@@ -87,8 +73,7 @@ View Evaluation::view(const Settings& settings, const Standing& standing) const 
   view.state = standing.state;
   view.rate = rate_.data();
   view.signals = &signals_;
-  view.control_rate = control_rate_.data();
-  view.x_star = x_star_.data();
+  view.x_star = equilibrium_valid_ ? x_star_.data() : nullptr;
   view.statistics = standing.statistics;
   return view;
 }

@@ -3,6 +3,7 @@
 
 #include "closed_loop.hpp"
 #include "external_disturbance.hpp"
+#include "loop_jacobian.hpp"
 #include "settings.hpp"
 
 namespace mixed_order_game {
@@ -28,15 +29,15 @@ class Evaluation {
   void act(const Settings& settings);
   void act(const ExternalDisturbance& input);
   /// The run stands somewhere else, or goes on from another run.
-  void moved() { signals_valid_ = control_rates_valid_ = false; }
+  void moved() { signals_valid_ = linearized_ = false; }
   /// The costs, whose equilibrium is asked for, are others.
   void costs_changed() { equilibrium_valid_ = false; }
 
   /// Computes what the variables of a stage need.
   void prepare(Stage stage, Settings& settings, const Standing& standing);
   void prepare_signals(const Standing& standing);
-  /// u' for the derivatives of outputs.
-  void prepare_control_rates(const Standing& standing);
+  /// The loop's Jacobian, after prepare_signals.
+  const LoopJacobian& linearize(const Standing& standing);
   /// Throws GameError when the game has no unique equilibrium.
   void prepare_equilibrium(Settings& settings);
 
@@ -50,11 +51,11 @@ class Evaluation {
   ExternalDisturbance input_;
 
   bool signals_valid_ = false;
-  bool control_rates_valid_ = false;
+  bool linearized_ = false;
   bool equilibrium_valid_ = false;
   Signals signals_;
   AlignedVector rate_;
-  AlignedVector control_rate_;
+  LoopJacobian jacobian_;
   AlignedVector d_ext_;  // that acts
   AlignedVector d_ext_as_set_;
   std::vector<Real> x_star_;

@@ -279,11 +279,13 @@ fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte serializedSta
   }));
 }
 
-fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReference /*vUnknown_ref*/[],
-                                        size_t /*nUnknown*/, const fmi2ValueReference /*vKnown_ref*/[],
-                                        size_t /*nKnown*/, const fmi2Real /*dvKnown*/[], fmi2Real /*dvUnknown*/[]) {
-  return status(guarded(c, Call::get_directional_derivative, "fmi2GetDirectionalDerivative", [](Component&) {
-    throw Error("directional derivatives are not provided (see providesDirectionalDerivative)");
+fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReference vUnknown_ref[], size_t nUnknown,
+                                        const fmi2ValueReference vKnown_ref[], size_t nKnown, const fmi2Real dvKnown[],
+                                        fmi2Real dvUnknown[]) {
+  return status(guarded(c, Call::get_directional_derivative, "fmi2GetDirectionalDerivative", [&](Component& component) {
+    component.instance.get_directional_derivative(
+        array(vUnknown_ref, nUnknown, "vUnknown_ref"), array(vKnown_ref, nKnown, "vKnown_ref"),
+        array(dvKnown, nKnown, "dvKnown").data(), array(dvUnknown, nUnknown, "dvUnknown").data());
   }));
 }
 

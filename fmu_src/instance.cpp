@@ -42,6 +42,7 @@ Instance::Instance(Model model)
     : model_(std::move(model)),
       settings_(model_.game),
       evaluation_(model_.game),
+      directional_derivative_(model_, evaluation_.loop()),
       initial_state_(at(evaluation_.loop().layout().size())),
       initial_modes_(at(evaluation_.loop().shape().actions())) {}
 
@@ -204,7 +205,7 @@ void Instance::get_output_derivatives(std::span<const std::uint32_t> references,
   for (std::size_t k = 0; k < references.size(); ++k) {
     const int reference = known(references[k], Type::real);
     const std::string name = variables.name(reference);
-    if (variables.family(reference).read_derivative == nullptr) {
+    if (variables.family(reference).causality != Causality::output) {
       throw Error(name + " is not an output, and only outputs have derivatives that can be read");
     }
     if (orders[k] < 1 || orders[k] > highest_output_derivative) {
@@ -212,18 +213,54 @@ void Instance::get_output_derivatives(std::span<const std::uint32_t> references,
                   std::to_string(highest_output_derivative));
     }
   }
+  const View source = prepare_tangent(references);
+  const Tangent tangent = directional_derivative_.along_run(source, evaluation_.linearize(standing()));
+  read_along(references, source, tangent, values);
+}
+
+void Instance::get_directional_derivative(std::span<const std::uint32_t> unknowns,
+                                          std::span<const std::uint32_t> knowns, const Real* changes,
+                                          Real* derivatives) {
+  const Equations equations = phase_ == Phase::initialization ? Equations::initial : Equations::running;
+  for (const std::uint32_t unknown : unknowns) {
+    const int reference = known(unknown, Type::real);
+    if (!is_unknown(model_, reference, equations)) throw Error(why_no_unknown(model_, reference, equations));
+  }
+  DirectionalDerivative::Changes direction;
+  for (std::size_t k = 0; k < knowns.size(); ++k) {
+    const int reference = known(knowns[k], Type::real);
+    if (!is_known(model_, reference, equations)) throw Error(why_no_known(model_, reference, equations));
+    if (!std::isfinite(changes[k])) {
+      throw Error("the change of " + model_.variables.name(reference) + " is " + text_of(changes[k]) +
+                  ", expected a finite number");
+    }
+    direction[reference] += changes[k];
+  }
+  const View source = prepare_tangent(unknowns);
+  const Tangent tangent =
+      directional_derivative_.along(direction, equations, source, evaluation_.linearize(standing()));
+  read_along(unknowns, source, tangent, derivatives);
+}
+
+/// What a tangent needs, and the variables whose derivatives are asked for.
+View Instance::prepare_tangent(std::span<const std::uint32_t> references) {
   Stages needed{};
+  needed[static_cast<std::size_t>(Stage::signals)] = true;
   for (const std::uint32_t reference : references) {
-    needed[static_cast<std::size_t>(variables.family(static_cast<int>(reference)).stage)] = true;
+    needed[static_cast<std::size_t>(model_.variables.family(static_cast<int>(reference)).stage)] = true;
   }
   prepare(needed);
-  evaluation_.prepare_control_rates(standing());
-  const View source = evaluation_.view(settings_, standing());
+  return evaluation_.view(settings_, standing());
+}
+
+void Instance::read_along(std::span<const std::uint32_t> references, const View& source, const Tangent& tangent,
+                          Real* values) {
+  const ModelVariables& variables = model_.variables;
   scratch_.resize(references.size());
   for (std::size_t k = 0; k < references.size(); ++k) {
     const auto reference = static_cast<int>(references[k]);
-    scratch_[k] = variables.family(reference).read_derivative(source, variables.variable(reference).slot);
-    require_finite(scratch_[k], "the derivative of " + variables.name(reference));
+    scratch_[k] = variables.family(reference).read_along(source, tangent, variables.variable(reference).slot);
+    if (!std::isfinite(scratch_[k])) require_finite(scratch_[k], "the derivative of " + variables.name(reference));
   }
   std::copy(scratch_.begin(), scratch_.end(), values);
 }

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "co_simulation.hpp"
+#include "directional_derivative.hpp"
 #include "errors.hpp"
 #include "evaluation.hpp"
 #include "lifecycle.hpp"
@@ -43,6 +44,9 @@ class Instance {
   void set(Type type, std::span<const std::uint32_t> references, const Real* values);
   void set_input_derivatives(std::span<const std::uint32_t> references, const int* orders, const Real* values);
   void get_output_derivatives(std::span<const std::uint32_t> references, const int* orders, Real* values);
+  /// derivatives[k] of unknown k along changes of the knowns; a known that is named twice changes by the sum.
+  void get_directional_derivative(std::span<const std::uint32_t> unknowns, std::span<const std::uint32_t> knowns,
+                                  const Real* changes, Real* derivatives);
 
   /// Moves from the communication point t to t + h.
   void do_step(Real t, Real h);
@@ -61,6 +65,8 @@ class Instance {
   [[nodiscard]] Tolerances tolerances() const;
   void act();
   void prepare(const Stages& needed);
+  [[nodiscard]] View prepare_tangent(std::span<const std::uint32_t> references);
+  void read_along(std::span<const std::uint32_t> references, const View& source, const Tangent& tangent, Real* values);
   void settings_changed(bool equilibrium_moved);
   void set_input_derivative(int slot, int order, Real value);
   void check_settings();
@@ -73,6 +79,7 @@ class Instance {
   Settings settings_;    // as the importer set them
   bool touched_ = true;  // they may differ from those that act
   Evaluation evaluation_;
+  DirectionalDerivative directional_derivative_;
   AlignedVector initial_state_;
   Modes initial_modes_;
   std::unique_ptr<CoSimulation> co_simulation_;  // once the run has begun

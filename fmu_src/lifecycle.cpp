@@ -67,7 +67,9 @@ unsigned legal_in(Call call) {
   return 0;
 }
 
-std::string_view kind(const Family& family) {
+}  // namespace
+
+std::string_view kind_of(const Family& family) {
   switch (family.causality) {
     case Causality::parameter:
       return family.variability == Variability::fixed ? "a fixed parameter" : "a tunable parameter";
@@ -84,8 +86,6 @@ std::string_view kind(const Family& family) {
   }
   return "";
 }
-
-}  // namespace
 
 bool is_legal(Call call, Phase phase) { return (legal_in(call) & bit(phase)) != 0; }
 
@@ -108,7 +108,7 @@ bool may_be_set(const Family& family, Phase phase) {
 }
 
 std::string why_not_settable(const Family& family, Phase phase) {
-  std::string text = "is " + std::string(kind(family));
+  std::string text = "is " + std::string(kind_of(family));
   if (may_be_set(family, Phase::instantiated)) {
     text += ", which cannot be set in the state " + std::string(name_of(phase));
   } else {

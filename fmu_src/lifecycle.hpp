@@ -38,6 +38,9 @@ bool is_legal(Call call, Phase phase);
 /// As in "instantiated or initialization mode".
 std::string legal_phases(Call call);
 
+/// As in "a tunable parameter".
+std::string_view kind_of(const Family& family);
+
 bool may_be_set(const Family& family, Phase phase);
 /// Why a variable of this family cannot be set now.
 std::string why_not_settable(const Family& family, Phase phase);

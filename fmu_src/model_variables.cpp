@@ -87,20 +87,17 @@ template <auto Offset>
 Real read_rate(const View& view, int slot) {
   return view.rate[(view.loop->layout().*Offset)() + slot];
 }
+template <auto Offset>
+Real read_state_along(const View& view, const Tangent& tangent, int slot) {
+  return tangent.state[(view.loop->layout().*Offset)() + slot];
+}
+template <auto Offset>
+Real read_rate_along(const View& view, const Tangent& tangent, int slot) {
+  return tangent.rate[(view.loop->layout().*Offset)() + slot];
+}
 template <auto Member>
 Real read_count(const View& view, int) {
   return static_cast<Real>(std::min<std::int64_t>(view.statistics.*Member, std::numeric_limits<std::int32_t>::max()));
-}
-
-// d/dt |x - x*| = (x - x*)'x' / |x - x*|, and 0 at x*, where it has none
-Real nash_error_rate(const View& view, int) {
-  const int n = view.loop->shape().actions();
-  const Real* x = view.state + view.loop->layout().x();
-  const Real* x_rate = view.rate + view.loop->layout().x();
-  const Real error = nash_error(x, view.x_star, n);
-  Real product = 0.0;
-  for (int p = 0; p < n; ++p) product += (x[p] - view.x_star[p]) * x_rate[p];
-  return error > 0.0 ? product / error : 0.0;
 }
 
 using Index = std::array<int, 3>;
@@ -161,7 +158,7 @@ std::string text_of(Real value) {
 class ModelVariables::Builder {
  public:
   Builder(ModelVariables& table, const Game& game)
-      : table_(table), game_(game), shape_(game.parameters.shape), n_(shape_.actions()) {}
+      : table_(table), game_(game), shape_(game.parameters.shape), layout_(shape_), n_(shape_.actions()) {}
 
   void add_all() {
     add({.name = "time",
@@ -445,8 +442,9 @@ class ModelVariables::Builder {
          .unit = {"1", "1"},
          .nominal = 1.0,
          .stage = Stage::state,
+         .state = layout_.x(),
          .read = read_state<&StateLayout::x>,
-         .read_derivative = read_rate<&StateLayout::x>},
+         .read_along = read_state_along<&StateLayout::x>},
         actions());
     x_ = last_family();
     add({.name = "v",
@@ -456,8 +454,9 @@ class ModelVariables::Builder {
          .unit = {"1/s", "1/s"},
          .nominal = 1.0,
          .stage = Stage::state,
+         .state = layout_.reference(),
          .read = read_state<&StateLayout::reference>,
-         .read_derivative = read_rate<&StateLayout::reference>},
+         .read_along = read_state_along<&StateLayout::reference>},
         actions(2));
     v_ = last_family();
     add({.name = "u",
@@ -467,7 +466,7 @@ class ModelVariables::Builder {
          .unit = drive,
          .stage = Stage::signals,
          .read = read_signal<&Signals::control>,
-         .read_derivative = [](const View& view, int slot) { return view.control_rate[slot]; }},
+         .read_along = [](const View&, const Tangent& tangent, int slot) { return tangent.control[slot]; }},
         actions());
     add({.name = "nash_error",
          .description = "Distance from the Nash equilibrium: 2-norm of x - x_star",
@@ -479,7 +478,12 @@ class ModelVariables::Builder {
              [](const View& view, int) {
                return nash_error(view.state + view.loop->layout().x(), view.x_star, view.loop->shape().actions());
              },
-         .read_derivative = nash_error_rate},
+         .read_along =
+             [](const View& view, const Tangent& tangent, int) {
+               const int x = view.loop->layout().x();
+               return nash_error_along(view.state + x, view.x_star, tangent.state + x, tangent.x_star,
+                                       view.loop->shape().actions());
+             }},
         one());
     add({.name = "x_star",
          .description = "Nash equilibrium",
@@ -488,7 +492,8 @@ class ModelVariables::Builder {
          .declared_type = "Action",
          .unit = {"1", "1"},
          .stage = Stage::equilibrium,
-         .read = [](const View& view, int slot) { return view.x_star[slot]; }},
+         .read = [](const View& view, int slot) { return view.x_star[slot]; },
+         .read_along = [](const View&, const Tangent& tangent, int slot) { return tangent.x_star[slot]; }},
         actions());
   }
 
@@ -500,7 +505,9 @@ class ModelVariables::Builder {
          .unit = {"1", "1"},
          .nominal = 1.0,
          .stage = Stage::state,
-         .read = read_state<&StateLayout::reference>},
+         .state = layout_.reference(),
+         .read = read_state<&StateLayout::reference>,
+         .read_along = read_state_along<&StateLayout::reference>},
         actions(1));
     const int z = last_family();
     int y = -1;
@@ -512,7 +519,9 @@ class ModelVariables::Builder {
            .unit = {"1", "1"},
            .nominal = 1.0,
            .stage = Stage::state,
-           .read = read_state<&StateLayout::estimates>},
+           .state = layout_.estimates(),
+           .read = read_state<&StateLayout::estimates>,
+           .read_along = read_state_along<&StateLayout::estimates>},
           estimates());
       y = last_family();
       add({.name = "W",
@@ -521,7 +530,9 @@ class ModelVariables::Builder {
            .unit = drive,
            .nominal = W_nominal,
            .stage = Stage::state,
-           .read = read_state<&StateLayout::weights>},
+           .state = layout_.weights(),
+           .read = read_state<&StateLayout::weights>,
+           .read_along = read_state_along<&StateLayout::weights>},
           weights());
       W = last_family();
     }
@@ -588,7 +599,8 @@ class ModelVariables::Builder {
          .unit = unit,
          .stage = Stage::signals,
          .derivative_of = states,
-         .read = read_rate<Offset>},
+         .read = read_rate<Offset>,
+         .read_along = read_rate_along<Offset>},
         elements);
   }
 
@@ -625,6 +637,7 @@ class ModelVariables::Builder {
   ModelVariables& table_;
   const Game& game_;
   const Shape& shape_;
+  StateLayout layout_;
   int n_;
   int x_ = -1;
   int v_ = -1;

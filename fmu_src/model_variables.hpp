@@ -57,14 +57,15 @@ struct Family {
   Stage stage = Stage::settings;
   bool moves_equilibrium = false;
   int derivative_of = -1;  ///< family of states of which this one holds the derivatives, element by element
+  int state = -1;          ///< of states: position of slot 0 in the state vector
 
   /// Value of the element at a slot; Integer and Boolean values are exact in a Real.
   Real (*read)(const View& view, int slot) = nullptr;
   /// Null when it cannot be set.
   void (*write)(Settings& settings, int slot, Real value) = nullptr;
 
-  /// Time derivative of an output.
-  Real (*read_derivative)(const View& view, int slot) = nullptr;
+  /// Change of the element at a slot along a tangent; null unless the equations of the model determine it.
+  Real (*read_along)(const View& view, const Tangent& tangent, int slot) = nullptr;
 
   int first = 0;  ///< value references first .. first + count - 1
   int count = 0;

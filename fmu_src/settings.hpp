@@ -36,9 +36,16 @@ struct View {
   const Real* state = nullptr;
   const Real* rate = nullptr;
   const Signals* signals = nullptr;
-  const Real* control_rate = nullptr;  ///< u', only for derivatives of outputs
-  const Real* x_star = nullptr;
+  const Real* x_star = nullptr;  ///< null unless it is known
   Statistics statistics;
+};
+
+/// How the sources of a View change along a direction, to first order.
+struct Tangent {
+  const Real* state = nullptr;
+  const Real* rate = nullptr;
+  const Real* control = nullptr;
+  const Real* x_star = nullptr;
 };
 
 }  // namespace mixed_order_game

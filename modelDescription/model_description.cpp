@@ -65,7 +65,7 @@ void write_head(xml_node root, const Model& model) {
   attribute(co_simulation, "canNotUseMemoryManagementFunctions", "true");
   attribute(co_simulation, "canGetAndSetFMUstate", "true");
   attribute(co_simulation, "canSerializeFMUstate", "true");
-  attribute(co_simulation, "providesDirectionalDerivative", "false");
+  attribute(co_simulation, "providesDirectionalDerivative", "true");
 }
 
 void write_definitions(xml_node root) {

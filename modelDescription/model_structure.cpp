@@ -5,6 +5,8 @@
 #include <string>
 #include <unordered_map>
 
+#include "unknowns.hpp"
+
 namespace mixed_order_game {
 
 namespace {
@@ -14,14 +16,15 @@ using enum DependencyKind;
 class Analysis {
  public:
   explicit Analysis(const Model& model)
-      : variables_(model.variables),
+      : model_(model),
+        variables_(model.variables),
         parameters_(model.game.parameters),
         shape_(parameters_.shape),
         n_(shape_.actions()) {
     for (int reference = 0; reference < variables_.size(); ++reference) {
       references_[variables_.family(reference).name][variables_.variable(reference).slot] = reference;
     }
-    states_are_variables_ = references_.contains("y");
+    states_are_variables_ = model.game.expose == Expose::all;
   }
 
   ModelStructure result() {
@@ -33,8 +36,7 @@ class Analysis {
       if (family.causality == Causality::output) {
         structure.outputs.push_back(unknown(reference, [&] { output(name, slot); }));
       }
-      if (family.causality == Causality::output || family.causality == Causality::calculated_parameter ||
-          family.derivative_of >= 0 || (states_are_variables_ && is_state(name))) {
+      if (is_unknown(model_, reference, Equations::initial)) {
         structure.initial_unknowns.push_back(unknown(reference, [&] { initial_value(name, slot); }));
       }
     }
@@ -47,9 +49,6 @@ class Analysis {
   }
 
  private:
-  static bool is_state(const std::string& name) {
-    return name == "x" || name == "v" || name == "z" || name == "y" || name == "W";
-  }
   bool is_second(int p) const { return shape_.is_second_order(shape_.player_of(p)); }
 
   template <typename Collect>
@@ -64,14 +63,15 @@ class Analysis {
     structure.derivatives.push_back(unknown(references_.at(name).at(slot), [&] { derivative(name, slot); }));
   }
 
-  // A known that is no variable of this game (because it is not exposed) is left out.
-  void on(const std::string& name, int slot = 0, DependencyKind kind = dependent) {
+  // A known that is no variable of this game (because it is not exposed) is left out, and false returned.
+  bool on(const std::string& name, int slot = 0, DependencyKind kind = dependent) {
     const auto family = references_.find(name);
-    if (family == references_.end()) return;
+    if (family == references_.end()) return false;
     const auto reference = family->second.find(slot);
-    if (reference == family->second.end()) return;
+    if (reference == family->second.end()) return false;
     const auto [entry, is_new] = collected_.emplace(reference->second, kind);
     if (!is_new) entry->second = std::max(entry->second, kind);
+    return true;
   }
   void on_state(const std::string& name, int slot, DependencyKind kind = dependent) {
     if (states_are_variables_) on(name, slot, kind);
@@ -95,7 +95,7 @@ class Analysis {
       on_state("v", p, constant);
     } else if (name == "der(x" || name == "der(v") {
       control(p);
-      for_dynamics(p, [&](int other) { on_state("x", other); });
+      for_dynamics(p, [&](int other, DependencyKind kind) { on_state("x", other, kind); });
       on("d_ext", p, constant);
       on("time");
     } else if (name == "der(z") {
@@ -137,15 +137,15 @@ class Analysis {
       initial_control(p);
     } else if (name == "nash_error") {
       for (int other = 0; other < n_; ++other) on("x0", other);
-      for (int l = 0; l < shape_.dimension; ++l) costs_along(l);
+      for (int other = 0; other < n_; ++other) own_cost(other);
     } else if (name == "x_star") {
-      costs_along(shape_.coordinate_of(p));
+      equilibrium_of(p);
     } else if (name == "der(x" && is_second(p)) {
       on("v0", p);
     } else if (name == "der(x" || name == "der(v") {
       initial_control(p);
       on("perturbed");
-      for_dynamics(p, [&](int other) {
+      for_dynamics(p, [&](int other, DependencyKind) {
         on("dynamics_gain", i);
         on("x0", other);
       });
@@ -175,10 +175,14 @@ class Analysis {
 
   void initial_gradient(int p) {
     const int i = shape_.player_of(p);
-    on("cost_quadratic", i);
+    const Real* y0 = parameters_.initial.y.data() + i * n_;  // cannot be set where it is no variable
     on("cost_linear", p);
-    for (int j = 0; j < shape_.players; ++j) on("cost_coupling", i * shape_.players + j);
-    for_row(p, [&](int other) { on("y0", i * n_ + other); });
+    if (states_are_variables_ || y0[p] != 0.0) on("cost_quadratic", i);
+    for (int j = 0; j < shape_.players; ++j) {
+      const int other = shape_.entry(j, shape_.coordinate_of(p));
+      if (states_are_variables_ || y0[p] != y0[other]) on("cost_coupling", i * shape_.players + j);
+      on("y0", i * n_ + other);
+    }
   }
   void initial_error(int p) {
     if (is_second(p)) {
@@ -198,12 +202,28 @@ class Analysis {
     on("robust");
     initial_error(p);
   }
-  void costs_along(int l) {
-    for (int i = 0; i < shape_.players; ++i) {
-      on("cost_quadratic", i);
-      on("cost_linear", shape_.entry(i, l));
-      for (int j = 0; j < shape_.players; ++j) on("cost_coupling", i * shape_.players + j);
+  // x*_il follows the costs of i and of the players that it is coupled to, directly or by way of others
+  void equilibrium_of(int p) {
+    std::vector<int> found{p};
+    std::vector<bool> is_found(at(shape_.players));
+    is_found[at(shape_.player_of(p))] = true;
+    for (std::size_t next = 0; next < found.size(); ++next) {
+      for (const int j : own_cost(found[next])) {
+        if (!is_found[at(j)]) found.push_back(shape_.entry(j, shape_.coordinate_of(p)));
+        is_found[at(j)] = true;
+      }
     }
+  }
+  // coefficients of f_i along one coordinate; returns the players that i can be coupled to
+  std::vector<int> own_cost(int p) {
+    const int i = shape_.player_of(p);
+    std::vector<int> others;
+    on("cost_quadratic", i);
+    on("cost_linear", p);
+    for (int j = 0; j < shape_.players; ++j) {
+      if (on("cost_coupling", i * shape_.players + j)) others.push_back(j);
+    }
+    return others;
   }
 
   // all players' entries of the coordinate of p
@@ -213,10 +233,14 @@ class Analysis {
   }
   template <typename Each>
   void for_dynamics(int p, Each each) const {
-    const SparseRows& pattern = parameters_.dynamics->jacobian_pattern();
-    for (int k = pattern.start[at(p)]; k < pattern.start[at(p + 1)]; ++k) each(pattern.column[at(k)]);
+    const UnknownDynamics& dynamics = *parameters_.dynamics;
+    const SparseRows& pattern = dynamics.jacobian_pattern();
+    for (int k = pattern.start[at(p)]; k < pattern.start[at(p + 1)]; ++k) {
+      each(pattern.column[at(k)], dynamics.is_constant(k) ? tunable : dependent);
+    }
   }
 
+  const Model& model_;
   const ModelVariables& variables_;
   const Parameters& parameters_;
   const Shape& shape_;

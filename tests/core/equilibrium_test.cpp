@@ -126,7 +126,7 @@ TEST(NashEquilibrium, MovesWithTheCosts) {
     const std::vector<Real> forward = moved(h);
     const std::vector<Real> backward = moved(-h);
     const std::vector<Real> x_star = nash_equilibrium(cost, parameters.shape);
-    const std::vector<Real> along = nash_equilibrium_along(cost, direction, parameters.shape, x_star);
+    const std::vector<Real> along = nash_equilibrium_along(cost, direction, parameters.shape, x_star.data());
     for (std::size_t p = 0; p < along.size(); ++p) {
       EXPECT_NEAR(along[p], (forward[p] - backward[p]) / (2.0 * h), 1e-7) << "seed " << recipe.seed;
     }

@@ -11,6 +11,7 @@ namespace mixed_order_game {
 namespace {
 
 using testing::assorted_recipes;
+using testing::Blocks;
 using testing::flat_actions;
 using testing::LoopSignals;
 using testing::LoopState;
@@ -232,6 +233,22 @@ std::vector<Move> moves_of(const PlainGame& game, RandomNumbers& random) {
   add_rows("phase", &PlainGame::phase, [](Parameters& to, const Numbers& v) { disturbance_of(to).phase = v; });
   add_rows("bias", &PlainGame::bias, [](Parameters& to, const Numbers& v) { disturbance_of(to).bias = v; });
   add_rows("x0", &PlainGame::x0, [](Parameters& to, const Numbers& v) { to.initial.x = v; });
+  Blocks y0 = game.y0;
+  random.fill(y0, -1.0, 1.0);
+  moves.push_back({"y0",
+                   [=](PlainGame& moved, Real s) {
+                     for (std::size_t i = 0; i < N; ++i) {
+                       for (std::size_t j = 0; j < N; ++j) {
+                         for (std::size_t l = 0; l < D; ++l) moved.y0[i][j][l] += s * y0[i][j][l];
+                       }
+                     }
+                   },
+                   [=](Parameters& direction) {
+                     for (std::size_t i = 0; i < N; ++i) {
+                       const Numbers row = flat_actions(y0[i]);
+                       std::copy(row.begin(), row.end(), direction.initial.y.begin() + static_cast<long>(i * N * D));
+                     }
+                   }});
   add_rows("reference0", &PlainGame::reference0, [](Parameters& to, const Numbers& v) { to.initial.reference = v; });
 
   Numbers gain(N);  // the plain game has no gain: scaling its coefficients is the same
@@ -267,9 +284,7 @@ TEST_P(LoopTangentOfRandomGame, FollowsParametersAtTheStart) {
     Parameters direction = loop_.parameters().zero_direction();
     move.core(direction);
     direction.refresh();
-    ClosedLoop(direction).initial_state(tangent_.state.data());
-    tangent_.follow_state(jacobian_);
-    tangent_.add_parameters(direction, t, initial_state.data(), signals_);
+    tangent_.follow_parameters(jacobian_, direction, t, initial_state.data(), signals_);
     const auto along = [&](Real s) {
       PlainGame moved = game_;
       move.plain(moved, s);
@@ -294,8 +309,10 @@ TEST(LoopTangent, OfAnAmplitudeOfZeroHasNoRobustTerm) {
   loop.evaluate(t, state.data(), no_input.data(), Modes(no_input.size()), signals, rate.data());
   Parameters direction = loop.parameters().zero_direction();
   direction.gains.delta = direction.gains.epsilon = 1.0;
+  LoopJacobian jacobian(loop);
+  jacobian.linearize(state.data(), signals, Modes(no_input.size()));
   LoopTangent tangent(loop);
-  tangent.add_parameters(direction, t, state.data(), signals);
+  tangent.follow_parameters(jacobian, direction, t, state.data(), signals);
   for (const Real change : rates_and_controls(tangent)) EXPECT_EQ(change, 0.0);
 }
 

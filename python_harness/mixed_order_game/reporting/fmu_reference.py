@@ -48,6 +48,30 @@ default of games of more than 20,000 variables, `y`, `y0` and `W` do not exist, 
 A *fixed* parameter is set before the run, a *tunable* one also at any communication point.
 """
 
+DERIVATIVES = """## Directional derivatives and dependencies
+
+`fmi2GetDirectionalDerivative` is exact: it comes from the analytic Jacobian, by one product for each call.
+
+|  | unknowns | knowns |
+| --- | --- | --- |
+| in initialization mode | outputs, `x_star`, states, `der(...)` | parameters, `d_ext`, `time` |
+| afterwards | outputs, `der(...)` | states, `d_ext`, `time` |
+
+- Without `y` and `W` among the variables, neither states nor `der(...)` count; other variables are refused
+  by name.
+- Weight columns stay in their present mode: where one is about to enter or to leave the sphere, the
+  derivative is the one-sided one of the present mode. On the sphere the equations divide by `W_max`, not by
+  `w'w`.
+- With respect to `time`, inputs stand still. A known that is named twice changes by the sum.
+- At `x = x_star` the derivative of `nash_error` is defined as 0.
+- In a run parameters are those that act; what was set since the last step acts from the next one.
+
+The model structure lists a dependency exactly where this derivative is not zero for some state and some
+values of the parameters that can be set. An edge of weight zero counts, because it can be set; a term that
+the game's unknown dynamics lack does not. A factor of 1 is declared `constant`, one that only parameters
+change `tunable`.
+"""
+
 
 def fmu_reference(model: Model) -> str:
     """The page (Markdown) of an FMU: experiment, capabilities and every kind of variable."""
@@ -77,6 +101,7 @@ def fmu_reference(model: Model) -> str:
                 if any(name in each for each in model.capabilities.values())
             ],
         ),
+        DERIVATIVES,
     ]
     for title, causalities in SECTIONS:
         groups = _groups(model, causalities)
