@@ -32,6 +32,10 @@ std::vector<std::vector<int>> independent_groups(const SparseRows& pattern) {
   return of_root;
 }
 
+Eigen::Index position_in(const std::vector<int>& group, int entry) {
+  return std::lower_bound(group.begin(), group.end(), entry) - group.begin();
+}
+
 // Rows and columns of a group in the Jacobian of the pseudo-gradient, whose entries lie along the pattern.
 Eigen::MatrixXd block_of(const std::vector<int>& group, const SparseRows& pattern, const std::vector<Real>& values) {
   const auto size = static_cast<Eigen::Index>(group.size());
@@ -39,8 +43,7 @@ Eigen::MatrixXd block_of(const std::vector<int>& group, const SparseRows& patter
   for (Eigen::Index row = 0; row < size; ++row) {
     const auto entry = at(group[at(row)]);
     for (int k = pattern.start[entry]; k < pattern.start[entry + 1]; ++k) {
-      const auto column = std::lower_bound(group.begin(), group.end(), pattern.column[at(k)]) - group.begin();
-      block(row, column) += values[at(k)];
+      block(row, position_in(group, pattern.column[at(k)])) += values[at(k)];
     }
   }
   return block;
@@ -53,21 +56,73 @@ bool is_regular(const Eigen::PartialPivLU<Eigen::MatrixXd>& lu) {
   return lu.matrixLU().allFinite() && pivots.minCoeff() > singular * pivots.maxCoeff() && lu.rcond() > singular;
 }
 
-/// Replaces b by the solution of J solution = b, where J is the Jacobian of the pseudo-gradient.
-void solve_in_place(const std::vector<std::vector<int>>& groups, const SparseRows& pattern,
-                    const std::vector<Real>& hessian, std::vector<Real>& b) {
-  for (const std::vector<int>& group : groups) {
-    const Eigen::PartialPivLU<Eigen::MatrixXd> lu(block_of(group, pattern, hessian));
+/// Entries of a joint action in groups that depend on each other, each ascending and after those that it depends on:
+/// the strongly connected components of the pattern's graph from rows to columns, by Tarjan's algorithm.
+class DependentGroups {
+ public:
+  explicit DependentGroups(const SparseRows& pattern)
+      : group_of(at(pattern.rows()), -1), pattern_(pattern), number_(group_of.size(), 0), lowest_(group_of.size()) {
+    for (int row = 0; row < pattern.rows(); ++row) {
+      if (number_[at(row)] == 0) visit(row);
+    }
+  }
+
+  std::vector<std::vector<int>> groups;
+  std::vector<int> group_of;
+
+ private:
+  void visit(int row) {
+    lowest_[at(row)] = number_[at(row)] = ++visited_;
+    path_.push_back(row);
+    for (int k = pattern_.start[at(row)]; k < pattern_.start[at(row + 1)]; ++k) {
+      const int column = pattern_.column[at(k)];
+      if (number_[at(column)] == 0) visit(column);
+      if (group_of[at(column)] < 0) lowest_[at(row)] = std::min(lowest_[at(row)], lowest_[at(column)]);
+    }
+    if (lowest_[at(row)] != number_[at(row)]) return;
+    const auto first = std::find(path_.begin(), path_.end(), row);
+    std::vector<int> group(first, path_.end());
+    path_.erase(first, path_.end());
+    std::sort(group.begin(), group.end());
+    for (const int entry : group) group_of[at(entry)] = static_cast<int>(groups.size());
+    groups.push_back(std::move(group));
+  }
+
+  const SparseRows& pattern_;
+  std::vector<int> number_;  // in the order of visits, 0 before
+  std::vector<int> lowest_;  // number that the row leads back to
+  std::vector<int> path_;    // visited, and not yet in a group
+  int visited_ = 0;
+};
+
+/// Replaces b by the solution of J solution = b, where J is the Jacobian of the pseudo-gradient. Group by group, so
+/// that entries that do not depend on an entry of b are not touched by it, not even by rounding.
+void solve_in_place(const SparseRows& pattern, const std::vector<Real>& hessian, std::vector<Real>& b) {
+  const DependentGroups dependent(pattern);
+  for (const std::vector<int>& group : dependent.groups) {
+    const auto size = static_cast<Eigen::Index>(group.size());
+    Eigen::MatrixXd block = Eigen::MatrixXd::Zero(size, size);
+    Eigen::VectorXd solution(size);
+    for (Eigen::Index row = 0; row < size; ++row) {
+      const auto entry = at(group[at(row)]);
+      solution(row) = b[entry];
+      for (int k = pattern.start[entry]; k < pattern.start[entry + 1]; ++k) {
+        const int other = pattern.column[at(k)];
+        if (dependent.group_of[at(other)] == dependent.group_of[entry]) {
+          block(row, position_in(group, other)) += hessian[at(k)];
+        } else {
+          solution(row) -= hessian[at(k)] * b[at(other)];
+        }
+      }
+    }
+    const Eigen::PartialPivLU<Eigen::MatrixXd> lu(block);
     if (!is_regular(lu)) {
       throw GameError(
           "the game has no unique Nash equilibrium: the Jacobian of its pseudo-gradient is singular"
           " (reciprocal condition number below 1e-13), expected cost parameters that make it regular");
     }
-    const auto size = static_cast<Eigen::Index>(group.size());
-    Eigen::VectorXd solution(size);
-    for (Eigen::Index k = 0; k < size; ++k) solution(k) = b[at(group[at(k)])];
     solution = lu.solve(solution);
-    for (Eigen::Index k = 0; k < size; ++k) b[at(group[at(k)])] = solution(k);
+    for (Eigen::Index row = 0; row < size; ++row) b[at(group[at(row)])] = solution(row);
   }
 }
 
@@ -83,14 +138,13 @@ std::vector<Real> nash_equilibrium(const Cost& cost, const Shape& shape) {
   constexpr int most_iterations = 50;
   const std::size_t n = at(shape.actions());
   const SparseRows& pattern = cost.hessian_pattern();
-  const std::vector<std::vector<int>> groups = independent_groups(pattern);
   std::vector<Real> hessian(at(pattern.entries()));
   std::vector<Real> step(n);
   std::vector<Real> x(n, 0.0);
   for (int iteration = 0; iteration < most_iterations; ++iteration) {
     cost.own_gradients(x.data(), 0, step.data());
     cost.hessian_rows(x.data(), 0, hessian.data());
-    solve_in_place(groups, pattern, hessian, step);
+    solve_in_place(pattern, hessian, step);
     for (std::size_t p = 0; p < n; ++p) x[p] -= step[p];
     if (largest_magnitude(step) <= 1e-14 * (1.0 + largest_magnitude(x))) return x;
   }
@@ -108,7 +162,7 @@ std::vector<Real> nash_equilibrium_along(const Cost& cost, const Cost& direction
   cost.hessian_rows(x_star, 0, hessian.data());
   cost.own_gradients_along(direction, x_star, 0, along.data());
   for (Real& entry : along) entry = -entry;
-  solve_in_place(independent_groups(pattern), pattern, hessian, along);
+  solve_in_place(pattern, hessian, along);
   return along;
 }
 

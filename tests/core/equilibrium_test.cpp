@@ -133,6 +133,25 @@ TEST(NashEquilibrium, MovesWithTheCosts) {
   }
 }
 
+// Player 3 follows 2, 2 follows 1, and 1 follows nobody: what is downstream cannot be felt, not even by rounding.
+TEST(NashEquilibrium, OfAPlayerThatFollowsNobodyStandsStill) {
+  QuadraticCost cost(3, 1);
+  cost.quadratic = {0.3, 0.7, 0.1};
+  cost.linear = {1.0, -2.0, 0.5};
+  cost.coupling = {0.0, 0.0, 0.0, 9.0, 0.0, 0.0, 0.0, 7.0, 0.0};
+  cost.refresh();
+  const Shape shape{.players = 3, .dimension = 1, .neurons = 1, .order = {1, 1, 1}};
+  const std::vector<Real> x_star = nash_equilibrium(cost, shape);
+  EXPECT_DOUBLE_EQ(x_star[0], -1.0 / 0.6);
+  QuadraticCost direction(3, 1);
+  direction.linear = {0.0, 0.9, 0.8};
+  direction.refresh();
+  const std::vector<Real> along = nash_equilibrium_along(cost, direction, shape, x_star.data());
+  EXPECT_EQ(along[0], 0.0);
+  EXPECT_NEAR(along[1], -0.9 / (2.0 * 9.7), 1e-15);
+  EXPECT_NEAR(along[2], (-0.8 + 14.0 * along[1]) / (2.0 * 7.1), 1e-15);
+}
+
 TEST(StrongMonotonicity, IsTheSmallestEigenvalueOfTheSymmetricPart) {
   // P' = [[2 q_1 + 2 c_12, -2 c_12], [-2 c_21, 2 q_2 + 2 c_21]] with q = (1, 2), c_12 = 3, c_21 = 0
   QuadraticCost cost(2, 1);
