@@ -21,10 +21,11 @@ Tangent DirectionalDerivative::along(const Changes& changes, Equations equations
     follow_states(changes, jacobian);
   }
   std::fill(d_ext_.begin(), d_ext_.end(), 0.0);
-  for (const auto& [reference, change] : changes) {
+  for (std::size_t k = 0; k < changes.references.size(); ++k) {
+    const auto reference = static_cast<int>(changes.references[k]);
     const Causality causality = model_->variables.family(reference).causality;
-    if (causality == Causality::input) d_ext_[at(model_->variables.variable(reference).slot)] = change;
-    if (causality == Causality::independent) tangent_.add_time(view.time, change);
+    if (causality == Causality::input) d_ext_[at(model_->variables.variable(reference).slot)] += changes.values[k];
+    if (causality == Causality::independent) tangent_.add_time(view.time, changes.values[k]);
   }
   tangent_.add_input(d_ext_.data());
   return tangent();
@@ -32,9 +33,10 @@ Tangent DirectionalDerivative::along(const Changes& changes, Equations equations
 
 void DirectionalDerivative::follow_states(const Changes& changes, const LoopJacobian& jacobian) {
   std::fill(tangent_.state.begin(), tangent_.state.end(), 0.0);
-  for (const auto& [reference, change] : changes) {
+  for (std::size_t k = 0; k < changes.references.size(); ++k) {
+    const auto reference = static_cast<int>(changes.references[k]);
     const int state = model_->variables.family(reference).state;
-    if (state >= 0) tangent_.state[at(state + model_->variables.variable(reference).slot)] = change;
+    if (state >= 0) tangent_.state[at(state + model_->variables.variable(reference).slot)] += changes.values[k];
   }
   tangent_.follow_state(jacobian);
   std::fill(x_star_.begin(), x_star_.end(), 0.0);
@@ -44,10 +46,14 @@ void DirectionalDerivative::follow_states(const Changes& changes, const LoopJaco
 void DirectionalDerivative::follow_parameters(const Changes& changes, const View& view, const LoopJacobian& jacobian) {
   Settings direction(model_->game);
   direction.parameters = loop_->parameters().zero_direction();
-  for (const auto& [reference, change] : changes) {
+  View written;
+  written.settings = &direction;
+  for (std::size_t k = 0; k < changes.references.size(); ++k) {
+    const auto reference = static_cast<int>(changes.references[k]);
     const Family& family = model_->variables.family(reference);
     if (family.causality != Causality::parameter) continue;
-    family.write(direction, model_->variables.variable(reference).slot, change);
+    const Real before = model_->variables.read(reference, written);
+    family.write(direction, model_->variables.variable(reference).slot, before + changes.values[k]);
   }
   direction.parameters.refresh();
   tangent_.follow_parameters(jacobian, direction.parameters, view.time, view.state, *view.signals);

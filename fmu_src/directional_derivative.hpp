@@ -1,7 +1,8 @@
 // How the variables change when known ones do, to first order and in the present projection modes.
 #pragma once
 
-#include <map>
+#include <cstdint>
+#include <span>
 
 #include "loop_tangent.hpp"
 #include "unknowns.hpp"
@@ -10,8 +11,11 @@ namespace mixed_order_game {
 
 class DirectionalDerivative {
  public:
-  /// Changes of known variables by their value references.
-  using Changes = std::map<int, Real>;
+  /// Changes of known variables; those of one that is named twice add up.
+  struct Changes {
+    std::span<const std::uint32_t> references;
+    const Real* values;
+  };
 
   /// Both must outlive it.
   DirectionalDerivative(const Model& model, const ClosedLoop& loop);

@@ -226,7 +226,6 @@ void Instance::get_directional_derivative(std::span<const std::uint32_t> unknown
     const int reference = known(unknown, Type::real);
     if (!is_unknown(model_, reference, equations)) throw Error(why_no_unknown(model_, reference, equations));
   }
-  DirectionalDerivative::Changes direction;
   for (std::size_t k = 0; k < knowns.size(); ++k) {
     const int reference = known(knowns[k], Type::real);
     if (!is_known(model_, reference, equations)) throw Error(why_no_known(model_, reference, equations));
@@ -234,11 +233,10 @@ void Instance::get_directional_derivative(std::span<const std::uint32_t> unknown
       throw Error("the change of " + model_.variables.name(reference) + " is " + text_of(changes[k]) +
                   ", expected a finite number");
     }
-    direction[reference] += changes[k];
   }
   const View source = prepare_tangent(unknowns);
   const Tangent tangent =
-      directional_derivative_.along(direction, equations, source, evaluation_.linearize(standing()));
+      directional_derivative_.along({knowns, changes}, equations, source, evaluation_.linearize(standing()));
   read_along(unknowns, source, tangent, derivatives);
 }
 
