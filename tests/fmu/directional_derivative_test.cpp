@@ -249,6 +249,9 @@ std::vector<Recipe> recipes() {
   return recipes;
 }
 
+/// The same game with expose = "outputs".
+std::string outputs_only(std::string game) { return game.insert(game.find("dimension"), "expose = \"outputs\"\n"); }
+
 /// Parameters and inputs away from values at which a factor happens to vanish.
 void make_generic(Slave& slave) {
   int salt = 0;
@@ -388,8 +391,9 @@ TEST(Structure, DependenciesInARunAreMinimalAndOfTheirKind) {
 }
 
 TEST(Structure, InitialDependenciesAreMinimal) {
-  const std::string hidden = small_game_with({{"dimension = 2\n", "dimension = 2\nexpose = \"outputs\"\n"}});
-  for (const std::string& game : {small_game(), vector_centers_game(), hidden}) {
+  const std::string uncoupled = small_game_with({{"coupling = [[1, 0.3], [3, 0.6]]", "coupling = []"}});
+  for (const std::string& game : {small_game(), vector_centers_game(), outputs_only(small_game()),
+                                  outputs_only(vector_centers_game()), outputs_only(uncoupled)}) {
     Slave slave(game);
     make_generic(slave);
     ASSERT_EQ(slave.set("epsilon", 20.0), fmi2OK);  // tanh must not be saturated
@@ -413,8 +417,7 @@ TEST(Structure, InitialDependenciesAreMinimal) {
 // Players 1 and 3 follow player 2 but not each other, and nothing can change that: couplings that are zero do not
 // exist.
 TEST(Structure, EquilibriaOfPlayersThatAreNotCoupledAreIndependent) {
-  const Model model(small_game_with({{"dimension = 2\n", "dimension = 2\nexpose = \"outputs\"\n"},
-                                     {"coupling = [[1, 0.3], [3, 0.6]]", "coupling = []"}}));
+  const Model model(outputs_only(small_game_with({{"coupling = [[1, 0.3], [3, 0.6]]", "coupling = []"}})));
   const Dependencies declared = dependencies_of(model, Equations::initial);
   const auto& first = declared.at("x_star[1,2]");
   EXPECT_TRUE(first.contains("cost_linear[2,2]"));
@@ -444,6 +447,18 @@ TEST(DirectionalDerivative, IsLinear) {
       size += std::abs(term);
     }
     EXPECT_NEAR(derivatives[k], sum, 1e-13 * size) << unknowns[k];
+  }
+}
+
+TEST(DirectionalDerivative, OfParametersNamedTwiceIsThatOfTheSum) {
+  Slave slave;
+  ASSERT_EQ(fmi2SetupExperiment(slave.component, fmi2False, 0.0, 0.0, fmi2False, 0.0), fmi2OK);
+  ASSERT_EQ(fmi2EnterInitializationMode(slave.component), fmi2OK);
+  const auto unknowns = names_where(slave.model(), Equations::initial, is_unknown);
+  for (const char* known : {"k2", "a[1,2]", "tolerance_relative", "d_ext[2,1]", "time", "y0[1,2,1]"}) {
+    EXPECT_EQ(directional_derivative(slave, unknowns, {known, known}, {0.5, 1.5}),
+              directional_derivative(slave, unknowns, {known}, {2.0}))
+        << known;
   }
 }
 
@@ -503,7 +518,7 @@ TEST(DirectionalDerivative, LeavesTheRunAlone) {
 }
 
 TEST(DirectionalDerivative, WithoutStatesAsVariablesHasInputsAndTimeAsKnowns) {
-  Slave slave(small_game_with({{"dimension = 2\n", "dimension = 2\nexpose = \"outputs\"\n"}}));
+  Slave slave(outputs_only(small_game()));
   slave.initialize();
   slave.run(0.0, 0.3, 1);
   const Table table = all_pairs(slave, Equations::running);
@@ -512,8 +527,7 @@ TEST(DirectionalDerivative, WithoutStatesAsVariablesHasInputsAndTimeAsKnowns) {
 }
 
 TEST(Behaviour10DirectionalDerivative, WhatIsNoUnknownOrKnownIsRefusedByName) {
-  const std::string hidden = small_game_with({{"dimension = 2\n", "dimension = 2\nexpose = \"outputs\"\n"}});
-  for (const std::string& game : {small_game(), hidden}) {
+  for (const std::string& game : {small_game(), outputs_only(small_game())}) {
     Slave slave(game);
     const Model& model = slave.model();
     const auto check_all = [&](Equations equations) {
@@ -551,8 +565,7 @@ TEST(Behaviour10DirectionalDerivative, WhatIsNoUnknownOrKnownIsRefusedByName) {
 
 // What the model structure lists is what is answered.
 TEST(Structure, ListsTheUnknownsAndTheirKnowns) {
-  const std::string hidden = small_game_with({{"dimension = 2\n", "dimension = 2\nexpose = \"outputs\"\n"}});
-  for (const std::string& game : {small_game(), vector_centers_game(), hidden}) {
+  for (const std::string& game : {small_game(), vector_centers_game(), outputs_only(small_game())}) {
     const Model model(game);
     for (const Equations equations : {Equations::initial, Equations::running}) {
       const Dependencies declared = dependencies_of(model, equations);
