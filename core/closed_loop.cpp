@@ -74,7 +74,8 @@ void ClosedLoop::evaluate(Real t, const Real* state, const Real* d_ext, const Mo
 
   evaluate_seeking(state, signals);
   if (strategy.robust) {
-    for (int p = 0; p < n; ++p) signals.radial[at(p)] = modes[at(p)] != 0 ? s[p] / rbf.W_max : 0.0;
+    for (int p = 0; p < n; ++p)
+      signals.radial[at(p)] = modes[at(p)] != 0 && e[p] * s[p] >= 0.0 ? s[p] / rbf.W_max : 0.0;
     kernel.weight_rates(n, shape.neurons, gains.beta, e, signals.radial.data(), signals.activation.data(),
                         state + layout_.weights(), rate + layout_.weights());
   } else {

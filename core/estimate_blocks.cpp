@@ -55,14 +55,17 @@ void EstimateBlocks::analyse(const CommunicationGraph& graph) {
 
 void EstimateBlocks::factor(const CommunicationGraph& graph, Real gamma_k3) {
   const int n = players_;
+  const NeighbourRows rows = graph.neighbours();
+  std::fill(gain_.begin(), gain_.end(), 0.0);
   for (int k = 0; k < n; ++k) {
     const int i = order_[at(k)];
     Real degree = 0.0;
-    for (int j = 0; j < n; ++j) degree += graph.weight(i, j);
-    for (int j = 0; j < n; ++j) {
-      const Real shared = gamma_k3 * graph.weight(i, j);
-      diagonal_[at(k * n + j)] = 1.0 + gamma_k3 * degree + shared;
-      gain_[at(i * n + j)] = shared;
+    for (int e = rows.start[i]; e < rows.start[i + 1]; ++e) degree += rows.weight[e];
+    std::fill_n(diagonal_.begin() + static_cast<std::ptrdiff_t>(k) * n, n, 1.0 + gamma_k3 * degree);
+    for (int e = rows.start[i]; e < rows.start[i + 1]; ++e) {
+      const Real shared = gamma_k3 * rows.weight[e];
+      diagonal_[at(k * n + rows.neighbour[e])] += shared;
+      gain_[at(i * n + rows.neighbour[e])] = shared;
     }
     for (int a = start_[at(k)]; a < start_[at(k + 1)]; ++a) {
       const Real edge = -gamma_k3 * graph.weight(i, order_[at(row_[at(a)])]);

@@ -16,6 +16,7 @@
 
 #include "errors.hpp"
 #include "kernels/kernels.hpp"
+#include "newton_iteration.hpp"
 
 namespace mixed_order_game {
 
@@ -39,6 +40,30 @@ void vector_fill(SunReal c, N_Vector z) { kernels().fill(NV_LENGTH_S(z), c, NV_D
 SunReal vector_weighted_norm(N_Vector x, N_Vector w) {
   const Size n = NV_LENGTH_S(x);
   return std::sqrt(kernels().weighted_square_sum(n, NV_DATA_S(x), NV_DATA_S(w)) / static_cast<Real>(n));
+}
+
+// Operations on several vectors go block by block, so that each number is read from memory once.
+template <typename Action>
+void for_each_block(N_Vector vector, Action action) {
+  constexpr Size block = 1024;
+  for (Size begin = 0, n = NV_LENGTH_S(vector); begin < n; begin += block) action(begin, std::min(block, n - begin));
+}
+int vector_scale_add_multi(int count, SunReal* a, N_Vector x, N_Vector* y, N_Vector* z) {
+  for_each_block(x, [&](Size begin, Size n) {
+    for (int k = 0; k < count; ++k) {
+      kernels().linear_sum(n, a[k], NV_DATA_S(x) + begin, 1.0, NV_DATA_S(y[k]) + begin, NV_DATA_S(z[k]) + begin);
+    }
+  });
+  return 0;
+}
+int vector_linear_combination(int count, SunReal* c, N_Vector* x, N_Vector z) {  // z may be x[0]
+  for_each_block(z, [&](Size begin, Size n) {
+    kernels().scale(n, c[0], NV_DATA_S(x[0]) + begin, NV_DATA_S(z) + begin);
+    for (int k = 1; k < count; ++k) {
+      kernels().linear_sum(n, c[k], NV_DATA_S(x[k]) + begin, 1.0, NV_DATA_S(z) + begin, NV_DATA_S(z) + begin);
+    }
+  });
+  return 0;
 }
 SunReal vector_max_norm(N_Vector x) { return kernels().max_norm(NV_LENGTH_S(x), NV_DATA_S(x)); }
 
@@ -83,6 +108,8 @@ Vector make_vector(int size, SUNContext context) {
   vector->ops->nvconst = vector_fill;
   vector->ops->nvwrmsnorm = vector_weighted_norm;
   vector->ops->nvmaxnorm = vector_max_norm;
+  vector->ops->nvscaleaddmulti = vector_scale_add_multi;
+  vector->ops->nvlinearcombination = vector_linear_combination;
   N_VConst(0.0, vector);
   return Vector(vector);
 }
@@ -104,7 +131,7 @@ std::string in_seconds(Real t) {
 
 }  // namespace
 
-class Integrator::Implementation {
+class Integrator::Implementation final : NewtonSystem {
  public:
   Implementation(const ClosedLoop& loop, const ExternalDisturbance& input, std::unique_ptr<NewtonSolver> newton);
 
@@ -123,17 +150,18 @@ class Integrator::Implementation {
  private:
   void begin_at_restart_point();
   void take_step();
-  void change_modes(Real t);
+  bool handle_event();
   void present(Real t);
   void interpolate(Real t, Real* state);
   void settle(Real* state);
   [[noreturn]] void fail(int flag, Real t);
 
   // CVODE's callbacks
-  int rate(Real t, const Real* state, Real* rate) noexcept;
+  int rate(Real t, const Real* state, Real* rate) noexcept override;
+  int finite_rate(Real t, const Real* state, Real* rate) noexcept;
   int event_functions(const Real* state, Real* values) noexcept;
   int newton_matrix(const Real* state, Real gamma) noexcept;
-  int solve_newton(N_Vector x, N_Vector b) noexcept;
+  int solve(Real* b) noexcept override;
 
   template <typename Action>
   int guarded(Action action) noexcept {
@@ -161,7 +189,7 @@ class Integrator::Implementation {
   std::int64_t steps_since_restart_ = 0;
 
   // where CVODE stands
-  Real internal_time_ = 0.0;
+  Real internal_time_ = 0.0;  ///< up to here it has looked for events
   bool event_pending_ = false;
   Real event_time_ = 0.0;
   std::vector<int> event_columns_;  // 1 where a column's event function rose through zero
@@ -178,6 +206,7 @@ class Integrator::Implementation {
   AlignedVector norm2_;
   AlignedVector rate_;
   AlignedVector event_values_;
+  std::int64_t events_ = 0;
   std::int64_t newton_setups_ = 0;
   std::int64_t newton_solves_ = 0;
   std::exception_ptr failure_;
@@ -187,6 +216,7 @@ class Integrator::Implementation {
   Vector vector_;
   Matrix matrix_;
   LinearSolver linear_solver_;
+  NewtonIteration iteration_;
   Cvode cvode_;
 };
 
@@ -211,7 +241,8 @@ Integrator::Implementation::Implementation(const ClosedLoop& loop, const Externa
       event_values_(at(loop.shape().actions())),
       context_(make_context()),
       vector_(make_vector(size_, context_.get())),
-      matrix_(make_placeholder_matrix(context_.get())) {
+      matrix_(make_placeholder_matrix(context_.get())),
+      iteration_(*this, size_, context_.get()) {
   using Self = Implementation*;
   SUNLinearSolver solver = SUNLinSolNewEmpty(context_.get());
   if (solver == nullptr) throw std::bad_alloc();
@@ -222,9 +253,8 @@ Integrator::Implementation::Implementation(const ClosedLoop& loop, const Externa
     SUNLinSolFreeEmpty(stub);
     return 0;
   };
-  solver->ops->solve = [](SUNLinearSolver self, SUNMatrix, N_Vector x, N_Vector b, SunReal) {
-    return static_cast<Self>(self->content)->solve_newton(x, b);
-  };
+  // never called: the Newton iteration solves by itself
+  solver->ops->solve = [](SUNLinearSolver, SUNMatrix, N_Vector, N_Vector, SunReal) { return -1; };
 
   cvode_.reset(CVodeCreate(CV_BDF, context_.get()));
   if (cvode_ == nullptr) throw std::bad_alloc();
@@ -241,7 +271,7 @@ Integrator::Implementation::Implementation(const ClosedLoop& loop, const Externa
   require(CVodeInit(
               memory,
               [](SunReal t, N_Vector y, N_Vector rate, void* self) {
-                return static_cast<Self>(self)->rate(t, NV_DATA_S(y), NV_DATA_S(rate));
+                return static_cast<Self>(self)->finite_rate(t, NV_DATA_S(y), NV_DATA_S(rate));
               },
               0.0, vector_.get()),
           "CVodeInit");
@@ -261,6 +291,7 @@ Integrator::Implementation::Implementation(const ClosedLoop& loop, const Externa
                              return static_cast<Self>(self)->newton_matrix(NV_DATA_S(y), gamma);
                            }),
           "CVodeSetLinSysFn");
+  require(CVodeSetNonlinearSolver(memory, iteration_.handle()), "CVodeSetNonlinearSolver");
   const int columns = loop.shape().actions();
   require(CVodeRootInit(memory, columns,
                         [](SunReal, N_Vector y, SunReal* values, void* self) {
@@ -270,17 +301,25 @@ Integrator::Implementation::Implementation(const ClosedLoop& loop, const Externa
   std::vector<int> rising(at(columns), 1);
   require(CVodeSetRootDirection(memory, rising.data()), "CVodeSetRootDirection");
   CVodeSetNoInactiveRootWarn(memory);
+  // Factorizations cost about as much as an iteration here, so they are renewed often, and the step follows the error
+  // closely. Together with the iteration's own test that took 10 to 20 % less time at equal error, from N = 5 to 100.
+  CVodeSetLSetupFrequency(memory, 5);
+  CVodeSetDeltaGammaMaxLSetup(memory, 0.05);
+  CVodeSetEtaFixedStepBounds(memory, 0.0, 1.1);
 }
 
 int Integrator::Implementation::rate(Real t, const Real* state, Real* rate) noexcept {
   return guarded([&] {
     input_.values(t, d_ext_.data());
     loop_.evaluate(t, state, d_ext_.data(), modes_, signals_, rate);
-    Real sum;
-    Real squares;
-    kernels().moments(size_, rate, &sum, &squares);
-    return std::isfinite(squares) ? 0 : 1;  // 1: CVODE tries a smaller step
+    return 0;
   });
+}
+
+int Integrator::Implementation::finite_rate(Real t, const Real* state, Real* rate) noexcept {
+  const int result = this->rate(t, state, rate);
+  if (result != 0) return result;
+  return std::isfinite(kernels().dot(size_, rate, rate)) ? 0 : 1;  // 1: CVODE tries a smaller step
 }
 
 int Integrator::Implementation::event_functions(const Real* state, Real* values) noexcept {
@@ -293,17 +332,16 @@ int Integrator::Implementation::event_functions(const Real* state, Real* values)
 
 int Integrator::Implementation::newton_matrix(const Real* state, Real gamma) noexcept {
   return guarded([&] {
-    loop_.evaluate_seeking(state, signals_);
+    // CVODE factorizes right after an evaluation at the same state: the signals belong to it
     jacobian_.linearize(state, signals_, modes_);
     ++newton_setups_;
     return newton_->factor(jacobian_, gamma) ? 0 : 1;
   });
 }
 
-int Integrator::Implementation::solve_newton(N_Vector x, N_Vector b) noexcept {
+int Integrator::Implementation::solve(Real* b) noexcept {
   return guarded([&] {
-    if (x != b) std::copy_n(NV_DATA_S(b), size_, NV_DATA_S(x));
-    newton_->solve(NV_DATA_S(x));
+    newton_->solve(b);
     ++newton_solves_;
     return 0;
   });
@@ -323,9 +361,11 @@ void Integrator::Implementation::begin_at_restart_point() {
   steps_since_restart_ = 0;
   event_pending_ = false;
   internal_time_ = restart_time_;
+  events_ = restart_statistics_.events;
   newton_setups_ = restart_statistics_.newton_setups;
   newton_solves_ = restart_statistics_.newton_solves;
   message_.clear();
+  iteration_.reset();
   const int flag = CVodeReInit(cvode_.get(), restart_time_, vector_.get());
   if (flag < 0) fail(flag, restart_time_);
 }
@@ -350,10 +390,10 @@ void Integrator::Implementation::start(Real t, Tolerances tolerances) {
   steps_since_restart_ = 0;
   internal_time_ = t;
   restart_time_ = t;
-  newton_setups_ = newton_solves_ = 0;
+  events_ = newton_setups_ = newton_solves_ = 0;
   jacobian_.refresh();
   newton_->refresh(jacobian_);
-  if (rate(t, state_.data(), rate_.data()) != 0) fail(CV_RHSFUNC_FAIL, t);
+  if (finite_rate(t, state_.data(), rate_.data()) != 0) fail(CV_RHSFUNC_FAIL, t);
   loop_.weight_norms(state_.data(), norm2_.data());
   loop_.resolve_modes(norm2_.data(), signals_, modes_);
   restart_state_ = state_;
@@ -367,7 +407,7 @@ void Integrator::Implementation::restart(bool parameters_changed) {
     jacobian_.refresh();
     newton_->refresh(jacobian_);
   }
-  if (rate(time_, state_.data(), rate_.data()) != 0) fail(CV_RHSFUNC_FAIL, time_);
+  if (finite_rate(time_, state_.data(), rate_.data()) != 0) fail(CV_RHSFUNC_FAIL, time_);
   loop_.weight_norms(state_.data(), norm2_.data());
   // a column on the sphere lies there to rounding; only its direction can have changed
   loop_.resolve_modes(norm2_.data(), signals_, modes_);
@@ -378,14 +418,12 @@ void Integrator::Implementation::restart(bool parameters_changed) {
 }
 
 void Integrator::Implementation::take_step() {
-  Real t = internal_time_;
   const Real before = internal_time_;
   // CVODE derives its first step from the distance to the output time, so that must not depend on the caller
   const Real horizon = restart_time_ + std::max(1.0, 1e-3 * std::fabs(restart_time_));
-  const int flag = CVode(cvode_.get(), horizon, vector_.get(), &t, CV_ONE_STEP);
-  if (flag < 0) fail(flag, internal_time_);
+  const int flag = CVode(cvode_.get(), horizon, vector_.get(), &internal_time_, CV_ONE_STEP);
+  if (flag < 0) fail(flag, before);
   ++steps_since_restart_;
-  CVodeGetCurrentTime(cvode_.get(), &internal_time_);
   if (!(internal_time_ > before)) {
     throw IntegrationError("the integration stopped at t = " + in_seconds(before) +
                            ": the step size fell below the resolution of time");
@@ -393,7 +431,7 @@ void Integrator::Implementation::take_step() {
   std::fill(event_columns_.begin(), event_columns_.end(), 0);
   if (flag == CV_ROOT_RETURN) {
     event_pending_ = true;
-    event_time_ = t;
+    event_time_ = internal_time_;
     CVodeGetRootInfo(cvode_.get(), event_columns_.data());
     return;
   }
@@ -413,25 +451,33 @@ void Integrator::Implementation::take_step() {
   }
 }
 
-/// Handles the pending event at its time: a restart with the new modes.
-void Integrator::Implementation::change_modes(Real t) {
-  Statistics so_far = statistics();
-  AlignedVector& state = restart_state_;
-  interpolate(t, state.data());
-  settle(state.data());
-  if (rate(t, state.data(), rate_.data()) != 0) fail(CV_RHSFUNC_FAIL, t);
+/// Handles the pending event; true when that was a restart. A column that enters the sphere needs one, because its
+/// rates jump. One that leaves does not: its rates are those that CVODE has been using since.
+bool Integrator::Implementation::handle_event() {
+  event_pending_ = false;
+  const Real t = event_time_;
+  Real* state = NV_DATA_S(vector_.get());
+  interpolate(t, state);
+  settle(state);
+  loop_.evaluate_seeking(state, signals_);
+  bool restarts = steps_since_restart_ >= most_steps_between_restarts_;
   for (std::size_t p = 0; p < modes_.size(); ++p) {
     if (event_columns_[p] == 0) continue;
     const bool outward = signals_.error[p] * signals_.network[p] >= 0.0;
     const std::uint8_t mode = modes_[p] == 0 && outward ? 1 : 0;
-    so_far.events += mode != modes_[p] ? 1 : 0;
+    if (mode == modes_[p]) continue;
     modes_[p] = mode;
+    ++events_;
+    restarts = restarts || mode != 0;
   }
-  loop_.project(modes_, state.data());
-  restart_statistics_ = so_far;
+  if (!restarts) return false;
+  restart_statistics_ = statistics();
+  loop_.project(modes_, state);
+  std::copy_n(state, size_, restart_state_.begin());
   restart_time_ = t;
   restart_modes_ = modes_;
   begin_at_restart_point();
+  return true;
 }
 
 void Integrator::Implementation::interpolate(Real t, Real* state) {
@@ -441,7 +487,7 @@ void Integrator::Implementation::interpolate(Real t, Real* state) {
   }
   const int flag = CVodeGetDky(cvode_.get(), t, 0, vector_.get());
   if (flag < 0) fail(flag, t);
-  std::copy_n(NV_DATA_S(vector_.get()), size_, state);
+  if (state != NV_DATA_S(vector_.get())) std::copy_n(NV_DATA_S(vector_.get()), size_, state);
 }
 
 void Integrator::Implementation::present(Real t) {
@@ -453,7 +499,7 @@ void Integrator::Implementation::present(Real t) {
 void Integrator::Implementation::advance(Real t_end) {
   while (true) {
     if (event_pending_ && event_time_ <= t_end) {
-      change_modes(event_time_);
+      handle_event();
     } else if (internal_time_ >= t_end) {
       break;
     } else {
@@ -472,7 +518,8 @@ Statistics Integrator::Implementation::statistics() const {
     CVodeGetNumRhsEvals(cvode_.get(), &evaluations);
   }
   statistics.steps += steps;
-  statistics.rate_evaluations += evaluations;
+  statistics.rate_evaluations += evaluations + (steps_since_restart_ != 0 ? iteration_.iterations() : 0);
+  statistics.events = events_;
   statistics.newton_setups = newton_setups_;
   statistics.newton_solves = newton_solves_;
   return statistics;
@@ -500,7 +547,11 @@ bool Integrator::Implementation::restore(const Checkpoint& checkpoint, Tolerance
   try {
     while (same && steps_since_restart_ < checkpoint.steps_since_restart) {
       take_step();
-      same = internal_time_ <= checkpoint.time || steps_since_restart_ == checkpoint.steps_since_restart;
+      if (event_pending_ && event_time_ <= checkpoint.time) {
+        same = !handle_event();
+      } else {
+        same = internal_time_ <= checkpoint.time || steps_since_restart_ == checkpoint.steps_since_restart;
+      }
     }
     if (same) {
       present(checkpoint.time);

@@ -51,7 +51,7 @@ void LoopJacobian::linearize(const Real* state, const Signals& signals, const Mo
     // d phi / d e = K delta^2 / epsilon (1 - tanh^2)
     const Real tanh = gains.delta != 0.0 ? signals.robust[p] / gains.delta : 0.0;
     slope[p] = steepest * ((1.0 - tanh) * (1.0 + tanh));
-    inverse_bound[p] = modes[p] != 0 ? 1.0 / parameters.rbf.W_max : 0.0;
+    inverse_bound[p] = modes[p] != 0 && error[p] * network[p] >= 0.0 ? 1.0 / parameters.rbf.W_max : 0.0;
   }
 }
 

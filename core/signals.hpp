@@ -8,7 +8,9 @@
 
 namespace mixed_order_game {
 
-/// Mode of each weight column: 0 inside (w'w < W_max), 1 on the sphere (w'w = W_max and e w'S >= 0).
+/// Mode of each weight column: 0 inside (w'w < W_max), 1 on the sphere (w'w = W_max and e w'S >= 0). The mode alone
+/// does not decide the dynamics of a column on the sphere: where e w'S < 0 it moves as one inside, so that leaving the
+/// sphere changes nothing in the rates.
 using Modes = std::vector<std::uint8_t>;
 
 /// Filled by ClosedLoop::evaluate. Vectors are indexed by entry(i, l) unless said otherwise.
@@ -34,7 +36,7 @@ struct Signals {
   AlignedVector dynamics;     ///< g(x)
   AlignedVector disturbance;  ///< d(t) and external disturbance
   AlignedVector control;      ///< u
-  AlignedVector radial;       ///< w'S / W_max on the sphere, else 0
+  AlignedVector radial;       ///< w'S / W_max on the sphere while e w'S >= 0, else 0
   AlignedVector exponent;     ///< scratch
   AlignedVector activation;   ///< S_m(y_i) at m * N D + entry(i, l)
 };

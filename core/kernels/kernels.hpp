@@ -86,6 +86,11 @@ struct Kernels {
   /// sum of (x w)^2
   double (*weighted_square_sum)(std::int64_t n, const double* x, const double* w);
   double (*max_norm)(std::int64_t n, const double* x);
+  /// Negative residual of a BDF step: delta = gamma f - (rl1 zn1 + correction).
+  void (*newton_residual)(std::int64_t n, double gamma, const double* f, double rl1, const double* zn1,
+                          const double* correction, double* delta);
+  /// correction = correction + scale delta; returns the sum of (scale delta w)^2.
+  double (*add_correction)(std::int64_t n, double scale, const double* delta, const double* w, double* correction);
 };
 
 /// The best table for this processor; constant for the life of the process.

@@ -56,6 +56,8 @@ const Kernels MIXED_ORDER_GAME_JOIN(kernels_, MIXED_ORDER_GAME_LEVEL) = {
     error_weights,
     weighted_square_sum,
     max_norm,
+    newton_residual,
+    add_correction,
 };
 
 }  // namespace mixed_order_game

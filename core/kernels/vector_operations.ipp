@@ -59,3 +59,25 @@ double max_norm(std::int64_t n, const double* x) {
   }
   return largest;
 }
+
+void newton_residual(std::int64_t n, double gamma, const double* __restrict f, double rl1, const double* __restrict zn1,
+                     const double* __restrict correction, double* __restrict delta) {
+  for (std::int64_t k = 0; k < n; ++k) delta[k] = gamma * f[k] - (rl1 * zn1[k] + correction[k]);
+}
+
+double add_correction(std::int64_t n, double scale_of, const double* delta, const double* w, double* correction) {
+  return sum_of(
+      static_cast<int>(n),
+      [=](int k) {
+        const Vector change = scale_of * load(delta + k);
+        store(load(correction + k) + change, correction + k);
+        const Vector product = change * load(w + k);
+        return product * product;
+      },
+      [=](int k) {
+        const double change = scale_of * delta[k];
+        correction[k] += change;
+        const double product = change * w[k];
+        return product * product;
+      });
+}

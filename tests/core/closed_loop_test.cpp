@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "game.hpp"
 #include "reference_loop.hpp"
 
@@ -95,7 +97,23 @@ TEST_P(ClosedLoopOfRandomGame, InitialStateIsThatOfTheDefinition) {
   EXPECT_EQ(state, expected.flat());
 }
 
-TEST_P(ClosedLoopOfRandomGame, OnTheSphereTheNormIsAnInvariant) {
+TEST_P(ClosedLoopOfRandomGame, LeavingTheSphereDoesNotChangeTheRates) {
+  std::vector<std::vector<int>> on_sphere;
+  const std::vector<Real> state = random_state(game_, random_, on_sphere).flat();
+  const std::vector<Real> no_input(at(loop_.shape().actions()), 0.0);
+  Signals signals(loop_.shape());
+  Modes modes(at(loop_.shape().actions()), 1);
+  std::vector<Real> on(at(loop_.layout().size()));
+  std::vector<Real> off(on.size());
+  loop_.evaluate(0.3, state.data(), no_input.data(), modes, signals, on.data());
+  for (std::size_t p = 0; p < modes.size(); ++p) {
+    if (signals.error[p] * signals.network[p] < 0.0) modes[p] = 0;
+  }
+  loop_.evaluate(0.3, state.data(), no_input.data(), modes, signals, off.data());
+  EXPECT_EQ(on, off);
+}
+
+TEST_P(ClosedLoopOfRandomGame, OnTheSphereTheNormNeverGrows) {
   std::vector<std::vector<int>> on_sphere;
   LoopState<Real> state = random_state(game_, random_, on_sphere);
   Signals signals(loop_.shape());
@@ -113,7 +131,9 @@ TEST_P(ClosedLoopOfRandomGame, OnTheSphereTheNormIsAnInvariant) {
         growth += 2.0 * state.W[i][m][l] * rates.W[i][m][l];
         size += std::abs(state.W[i][m][l] * rates.W[i][m][l]);
       }
-      EXPECT_NEAR(growth, 0.0, 1e-12 * size + 1e-10 * game_.W_max) << i << ' ' << l;
+      const std::size_t p = l * game_.players + i;
+      const Real inward = std::min(0.0, 2.0 * game_.beta * signals.error[p] * signals.network[p]);
+      EXPECT_NEAR(growth, inward, 1e-12 * size + 1e-10 * game_.W_max) << i << ' ' << l;
     }
   }
 }

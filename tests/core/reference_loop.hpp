@@ -89,7 +89,7 @@ Scalar reference_cost(const PlainGame& game, std::size_t i, const RowsOf<Scalar>
   return f;
 }
 
-/// The state's rate of change. on_sphere[i][l] says which law the weight column (i, l) follows. With
+/// The state's rate of change. on_sphere[i][l] says that the weight column (i, l) is projected where e w'S >= 0. With
 /// frozen_activation, S_i is computed from the real part of y_i alone, which removes its derivative.
 template <typename Scalar>
 LoopState<Scalar> reference_rate(const PlainGame& game, double t, const LoopState<Scalar>& state, const Rows& d_ext,
@@ -146,7 +146,9 @@ LoopState<Scalar> reference_rate(const PlainGame& game, double t, const LoopStat
       }
       for (std::size_t m = 0; m < q && game.robust; ++m) {
         rate.W[i][m][l] = game.beta * s.activation[i][m] * e;
-        if (on_sphere[i][l] != 0) rate.W[i][m][l] -= game.beta * e * network / game.W_max * W[i][m][l];
+        if (on_sphere[i][l] != 0 && std::real(e * network) >= 0.0) {
+          rate.W[i][m][l] -= game.beta * e * network / game.W_max * W[i][m][l];
+        }
       }
       s.gradient[i][l] = gradient;
       s.error[i][l] = e;

@@ -1,0 +1,134 @@
+#include "newton_iteration.hpp"
+
+#include <cvode/cvode.h>
+#include <nvector/nvector_serial.h>
+
+#include <algorithm>
+#include <cmath>
+#include <new>
+
+#include "kernels/kernels.hpp"
+
+namespace mixed_order_game {
+
+namespace {
+
+#if SUNDIALS_VERSION_MAJOR < 7
+using SunBoolean = booleantype;
+#else
+using SunBoolean = sunbooleantype;
+#endif
+
+// The Jacobian is exact but for the coupling that the solver may leave out, so a fresh factorization contracts well.
+constexpr Real rate_after_factorization = 0.1;
+
+int rate_failure(int result) { return result < 0 ? CV_RHSFUNC_FAIL : SUN_NLS_CONV_RECVR; }
+
+}  // namespace
+
+NewtonIteration::NewtonIteration(NewtonSystem& system, int size, SUNContext context)
+    : system_(system), handle_(SUNNonlinSolNewEmpty(context)), delta_(at(size)) {
+  if (handle_ == nullptr) throw std::bad_alloc();
+  using Handle = SUNNonlinearSolver;
+  static constexpr auto self = [](Handle handle) { return static_cast<NewtonIteration*>(handle->content); };
+  handle_->content = this;
+  auto& operations = *handle_->ops;
+  operations.gettype = [](Handle) { return SUNNONLINEARSOLVER_ROOTFIND; };
+  operations.free = [](Handle) { return 0; };  // by the destructor
+  operations.initialize = [](Handle) { return 0; };
+  operations.solve = [](Handle handle, N_Vector, N_Vector correction, N_Vector weight, auto tolerance, auto factorize,
+                        void* cvode) {
+    return self(handle)->solve(correction, weight, tolerance, factorize != 0, cvode);
+  };
+  // residual, solve and convergence test are its own
+  operations.setsysfn = [](Handle, SUNNonlinSolSysFn) { return 0; };
+  operations.setlsolvefn = [](Handle, SUNNonlinSolLSolveFn) { return 0; };
+  operations.setctestfn = [](Handle, SUNNonlinSolConvTestFn, void*) { return 0; };
+  operations.setlsetupfn = [](Handle handle, SUNNonlinSolLSetupFn factor) {
+    self(handle)->factor_ = factor;
+    return 0;
+  };
+  operations.setmaxiters = [](Handle handle, int most) {
+    self(handle)->most_iterations_ = most;
+    return 0;
+  };
+  operations.getnumiters = [](Handle handle, long* iterations) {
+    *iterations = self(handle)->last_iterations_;
+    return 0;
+  };
+  operations.getnumconvfails = [](Handle handle, long* failures) {
+    *failures = self(handle)->last_failures_;
+    return 0;
+  };
+}
+
+NewtonIteration::~NewtonIteration() { SUNNonlinSolFreeEmpty(handle_); }
+
+void NewtonIteration::reset() {
+  convergence_rate_ = 1.0;
+  jacobian_is_current_ = false;
+  iterations_ = 0;
+}
+
+int NewtonIteration::solve(N_Vector correction, N_Vector weight, Real tolerance, bool factorize, void* cvode) {
+  Real* c = NV_DATA_S(correction);  // CVODE has set it to zero
+  const Real* w = NV_DATA_S(weight);
+  last_iterations_ = last_failures_ = 0;
+  int result = iterate(c, w, tolerance, factorize, false, cvode);
+  if (result == SUN_NLS_CONV_RECVR && !jacobian_is_current_) {
+    ++last_failures_;
+    std::fill_n(c, delta_.size(), 0.0);
+    result = iterate(c, w, tolerance, true, true, cvode);
+  }
+  if (result == 0) jacobian_is_current_ = false;
+  return result;
+}
+
+int NewtonIteration::iterate(Real* correction, const Real* weight, Real tolerance, bool factorize, bool bad_jacobian,
+                             void* cvode) {
+  const Kernels& kernel = kernels();
+  const auto n = static_cast<std::int64_t>(delta_.size());
+  Real t = 0.0;
+  Real gamma = 0.0;
+  Real rl1 = 0.0;
+  N_Vector predicted = nullptr;
+  N_Vector iterate = nullptr;
+  N_Vector rate_vector = nullptr;
+  N_Vector zn1 = nullptr;
+  void* user_data = nullptr;
+  CVodeGetNonlinearSystemData(cvode, &t, &predicted, &iterate, &rate_vector, &gamma, &rl1, &zn1, &user_data);
+  Real* y = NV_DATA_S(iterate);
+  Real* f = NV_DATA_S(rate_vector);
+
+  if (const int result = system_.rate(t, NV_DATA_S(predicted), f); result != 0) return rate_failure(result);
+  if (factorize) {
+    std::copy_n(NV_DATA_S(predicted), n, y);
+    SunBoolean current = 0;
+    const int result = factor_(bad_jacobian ? 1 : 0, &current, cvode);
+    jacobian_is_current_ = current != 0;
+    if (result != 0) return result;
+    factored_gamma_ = gamma;
+    convergence_rate_ = rate_after_factorization;
+  }
+  // solutions for another gamma than the factored one, brought closer
+  const Real scale = gamma == factored_gamma_ ? 1.0 : 2.0 / (1.0 + gamma / factored_gamma_);
+  Real last_size = 0.0;
+  // a rate that is not finite makes the size so
+  for (int number = 0;; ++number) {
+    ++iterations_;
+    ++last_iterations_;
+    kernel.newton_residual(n, gamma, f, rl1, NV_DATA_S(zn1), correction, delta_.data());
+    if (const int result = system_.solve(delta_.data()); result != 0) return result < 0 ? CV_LSOLVE_FAIL : result;
+    const Real squares = kernel.add_correction(n, scale, delta_.data(), weight, correction);
+    const Real size = std::sqrt(squares / static_cast<Real>(n));
+    if (number > 0) convergence_rate_ = std::max(0.3 * convergence_rate_, size / last_size);
+    if (size * std::min(1.0, convergence_rate_) <= tolerance) return 0;
+    const bool diverges = number > 0 && size > 2.0 * last_size;
+    if (diverges || number + 1 == most_iterations_ || !std::isfinite(size)) return SUN_NLS_CONV_RECVR;
+    last_size = size;
+    kernel.linear_sum(n, 1.0, NV_DATA_S(predicted), 1.0, correction, y);
+    if (const int result = system_.rate(t, y, f); result != 0) return rate_failure(result);
+  }
+}
+
+}  // namespace mixed_order_game
