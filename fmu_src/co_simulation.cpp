@@ -3,19 +3,14 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
-#include <limits>
 
 #include "errors.hpp"
+#include "experiment.hpp"
 #include "model_variables.hpp"
 
 namespace mixed_order_game {
 
 namespace {
-
-// Importers form communication points by t += h or n * h: both stray by rounding, of t and of h.
-Real time_tolerance(Real t, Real h) {
-  return 64.0 * std::numeric_limits<Real>::epsilon() * std::fabs(t) + 1e-9 * std::fabs(h);
-}
 
 bool same_bits(std::span<const Real> a, std::span<const Real> b) {
   return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size_bytes()) == 0;

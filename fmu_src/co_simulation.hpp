@@ -10,9 +10,6 @@
 
 namespace mixed_order_game {
 
-/// What differs between two sets of settings, bit for bit.
-enum class Change { none, input, parameters };
-
 class CoSimulation {
  public:
   /// All that a run consists of besides the settings that the importer made since its last step.
@@ -28,7 +25,7 @@ class CoSimulation {
   void start(Real t, Tolerances tolerances, std::vector<Real> acting);
   [[nodiscard]] Standing standing() const;
 
-  /// Of `parameters + input` numbers, from those that act.
+  /// What differs, bit for bit, from the settings that act; the numbers of parameters come before those of inputs.
   [[nodiscard]] Change change_to(std::span<const Real> settings, std::size_t parameters) const;
   /// The evaluation has taken over changed settings.
   void settings_act(Change change, std::vector<Real> acting);

@@ -48,6 +48,11 @@ void Evaluation::prepare_signals(const Standing& standing) {
   signals_valid_ = true;
 }
 
+// Of the signals it writes those of seeking only, which prepare_signals finds for the same state.
+void Evaluation::event_indicators(const Standing& standing, Real* values) {
+  loop_.event_functions(standing.state, *standing.modes, signals_, values);
+}
+
 const LoopJacobian& Evaluation::linearize(const Standing& standing) {
   if (!linearized_) {
     jacobian_.refresh();

@@ -38,6 +38,8 @@ class Evaluation {
   void prepare_signals(const Standing& standing);
   /// The loop's Jacobian, after prepare_signals.
   const LoopJacobian& linearize(const Standing& standing);
+  /// One for each weight column, as ClosedLoop::event_functions.
+  void event_indicators(const Standing& standing, Real* values);
   /// Throws GameError when the game has no unique equilibrium.
   void prepare_equilibrium(Settings& settings);
 

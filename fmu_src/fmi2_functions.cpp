@@ -14,7 +14,17 @@ using namespace mixed_order_game;
 
 namespace {
 
-fmi2Status status(bool succeeded) { return succeeded ? fmi2OK : fmi2Error; }
+fmi2Status status(Outcome outcome) {
+  switch (outcome) {
+    case Outcome::done:
+      return fmi2OK;
+    case Outcome::discarded:
+      return fmi2Discard;
+    case Outcome::refused:
+      return fmi2Error;
+  }
+  return fmi2Error;
+}
 
 std::string text_or(const char* text, const char* otherwise) {
   return text != nullptr && *text != '\0' ? text : otherwise;
@@ -37,7 +47,7 @@ FmiLogger make_logger(const fmi2CallbackFunctions* callbacks, const std::string&
   if (callbacks == nullptr || callbacks->logger == nullptr) return {nullptr, on};
   return {[logger = callbacks->logger, environment = callbacks->componentEnvironment, instance_name](
               Severity severity, const char* category, const char* message) {
-            constexpr fmi2Status statuses[] = {fmi2OK, fmi2Warning, fmi2Error};
+            constexpr fmi2Status statuses[] = {fmi2OK, fmi2Warning, fmi2Discard, fmi2Error};
             logger(environment, instance_name.c_str(), statuses[static_cast<int>(severity)], category, message);
           },
           on};
@@ -90,10 +100,6 @@ void store(Component& component, fmi2FMUstate& handle, Snapshot snapshot) {
   handle = address;
 }
 
-fmi2Status no_model_exchange(fmi2Component c, const char* function) {
-  return status(guarded(c, Call::model_exchange, function, [](Component&) {}));
-}
-
 }  // namespace
 
 extern "C" {
@@ -109,7 +115,6 @@ fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2Str
   try {
     const FmiLogger logger = make_logger(functions, text_or(instanceName, model_identifier), loggingOn != fmi2False);
     contained(logger, "fmi2Instantiate", [&] {
-      if (fmuType != fmi2CoSimulation) throw Error("only co-simulation is available, not model exchange");
       const std::string path = path_of(text_or(fmuResourceLocation, "")) + "/game.toml";
       const std::string toml = content_of(path);
       const auto model = [&] {
@@ -123,7 +128,12 @@ fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2Str
         throw Error("the GUID is '" + guid + "', expected " + model.guid +
                     ": modelDescription.xml and the game definition do not belong together");
       }
-      made = std::make_unique<Component>(logger, model).release();
+      const Interface interface = fmuType == fmi2CoSimulation ? Interface::co_simulation : Interface::model_exchange;
+      if (interface == Interface::model_exchange && !model.offers_model_exchange()) {
+        throw Error(
+            "the game exposes outputs only, and model exchange needs all states: build it with expose = \"all\"");
+      }
+      made = std::make_unique<Component>(logger, model, interface).release();
     });
   } catch (...) {
     made = nullptr;
@@ -172,9 +182,12 @@ fmi2Status fmi2Terminate(fmi2Component c) {
     component.instance.terminate();
     if (component.logger.tells_events()) {
       const Statistics work = component.instance.statistics();
-      component.logger.event("the run ended at t = " + text_of(component.instance.time()) + " after " +
-                             std::to_string(work.steps) + " steps, " + std::to_string(work.rate_evaluations) +
-                             " evaluations of the rates and " + std::to_string(work.events) + " events");
+      std::string text = "the run ended at t = " + text_of(component.instance.time()) + " after ";
+      if (component.instance.interface() == Interface::co_simulation) {
+        text += std::to_string(work.steps) + " steps, " + std::to_string(work.rate_evaluations) +
+                " evaluations of the rates and ";
+      }
+      component.logger.event(text + std::to_string(work.events) + " events");
     }
   }));
 }
@@ -275,7 +288,7 @@ fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte serializedSta
     const Instance& instance = component.instance;
     store(
         component, handle,
-        from_bytes(array(serializedState, size, "serializedState"), instance.model().guid, instance.snapshot_sizes()));
+        from_bytes(array(serializedState, size, "serializedState"), instance.model().guid, instance.snapshot_shape()));
   }));
 }
 
@@ -325,7 +338,7 @@ fmi2Status fmi2CancelStep(fmi2Component c) {
 fmi2Status fmi2GetStatus(fmi2Component c, const fmi2StatusKind s, fmi2Status* value) {
   return status(guarded(c, Call::get_status, "fmi2GetStatus", [&](Component& component) {
     if (s != fmi2DoStepStatus) throw Error("only fmi2DoStepStatus has a value of type fmi2Status");
-    required(value, "value") = status(!component.last_step_failed);
+    required(value, "value") = component.last_step_failed ? fmi2Error : fmi2OK;
   }));
 }
 
@@ -357,39 +370,70 @@ fmi2Status fmi2GetStringStatus(fmi2Component c, const fmi2StatusKind s, fmi2Stri
 
 // Model exchange
 
-fmi2Status fmi2EnterEventMode(fmi2Component c) { return no_model_exchange(c, "fmi2EnterEventMode"); }
-
-fmi2Status fmi2NewDiscreteStates(fmi2Component c, fmi2EventInfo* /*eventInfo*/) {
-  return no_model_exchange(c, "fmi2NewDiscreteStates");
+fmi2Status fmi2EnterEventMode(fmi2Component c) {
+  return status(guarded(c, Call::enter_event_mode, "fmi2EnterEventMode",
+                        [](Component& component) { component.instance.enter_event_mode(); }));
 }
 
-fmi2Status fmi2EnterContinuousTimeMode(fmi2Component c) { return no_model_exchange(c, "fmi2EnterContinuousTimeMode"); }
+fmi2Status fmi2NewDiscreteStates(fmi2Component c, fmi2EventInfo* eventInfo) {
+  return status(guarded(c, Call::new_discrete_states, "fmi2NewDiscreteStates", [&](Component& component) {
+    fmi2EventInfo& info = required(eventInfo, "eventInfo");
+    const bool moved = component.instance.new_discrete_states();
+    info.newDiscreteStatesNeeded = fmi2False;
+    info.terminateSimulation = fmi2False;
+    info.nominalsOfContinuousStatesChanged = fmi2False;
+    info.valuesOfContinuousStatesChanged = moved ? fmi2True : fmi2False;
+    info.nextEventTimeDefined = fmi2False;  // disturbances are smooth in time
+    info.nextEventTime = 0.0;
+  }));
+}
+
+fmi2Status fmi2EnterContinuousTimeMode(fmi2Component c) {
+  return status(guarded(c, Call::enter_continuous_time_mode, "fmi2EnterContinuousTimeMode",
+                        [](Component& component) { component.instance.enter_continuous_time_mode(); }));
+}
 
 fmi2Status fmi2CompletedIntegratorStep(fmi2Component c, fmi2Boolean /*noSetFMUStatePriorToCurrentPoint*/,
-                                       fmi2Boolean* /*enterEventMode*/, fmi2Boolean* /*terminateSimulation*/) {
-  return no_model_exchange(c, "fmi2CompletedIntegratorStep");
+                                       fmi2Boolean* enterEventMode, fmi2Boolean* terminateSimulation) {
+  return status(guarded(c, Call::completed_integrator_step, "fmi2CompletedIntegratorStep", [&](Component& component) {
+    fmi2Boolean& enter = required(enterEventMode, "enterEventMode");
+    fmi2Boolean& terminate = required(terminateSimulation, "terminateSimulation");
+    enter = component.instance.completed_integrator_step() ? fmi2True : fmi2False;
+    terminate = fmi2False;
+  }));
 }
 
-fmi2Status fmi2SetTime(fmi2Component c, fmi2Real /*time*/) { return no_model_exchange(c, "fmi2SetTime"); }
-
-fmi2Status fmi2SetContinuousStates(fmi2Component c, const fmi2Real /*x*/[], size_t /*nx*/) {
-  return no_model_exchange(c, "fmi2SetContinuousStates");
+fmi2Status fmi2SetTime(fmi2Component c, fmi2Real time) {
+  return status(
+      guarded(c, Call::set_time, "fmi2SetTime", [&](Component& component) { component.instance.set_time(time); }));
 }
 
-fmi2Status fmi2GetDerivatives(fmi2Component c, fmi2Real /*derivatives*/[], size_t /*nx*/) {
-  return no_model_exchange(c, "fmi2GetDerivatives");
+fmi2Status fmi2SetContinuousStates(fmi2Component c, const fmi2Real x[], size_t nx) {
+  return status(guarded(c, Call::set_continuous_states, "fmi2SetContinuousStates",
+                        [&](Component& component) { component.instance.set_continuous_states(array(x, nx, "x")); }));
 }
 
-fmi2Status fmi2GetEventIndicators(fmi2Component c, fmi2Real /*eventIndicators*/[], size_t /*ni*/) {
-  return no_model_exchange(c, "fmi2GetEventIndicators");
+fmi2Status fmi2GetDerivatives(fmi2Component c, fmi2Real derivatives[], size_t nx) {
+  return status(guarded(c, Call::get_derivatives, "fmi2GetDerivatives", [&](Component& component) {
+    component.instance.get_derivatives(array(derivatives, nx, "derivatives"));
+  }));
 }
 
-fmi2Status fmi2GetContinuousStates(fmi2Component c, fmi2Real /*x*/[], size_t /*nx*/) {
-  return no_model_exchange(c, "fmi2GetContinuousStates");
+fmi2Status fmi2GetEventIndicators(fmi2Component c, fmi2Real eventIndicators[], size_t ni) {
+  return status(guarded(c, Call::get_event_indicators, "fmi2GetEventIndicators", [&](Component& component) {
+    component.instance.get_event_indicators(array(eventIndicators, ni, "eventIndicators"));
+  }));
 }
 
-fmi2Status fmi2GetNominalsOfContinuousStates(fmi2Component c, fmi2Real /*x_nominal*/[], size_t /*nx*/) {
-  return no_model_exchange(c, "fmi2GetNominalsOfContinuousStates");
+fmi2Status fmi2GetContinuousStates(fmi2Component c, fmi2Real x[], size_t nx) {
+  return status(guarded(c, Call::get_continuous_states, "fmi2GetContinuousStates",
+                        [&](Component& component) { component.instance.get_continuous_states(array(x, nx, "x")); }));
+}
+
+fmi2Status fmi2GetNominalsOfContinuousStates(fmi2Component c, fmi2Real x_nominal[], size_t nx) {
+  return status(guarded(c, Call::get_nominals, "fmi2GetNominalsOfContinuousStates", [&](Component& component) {
+    component.instance.get_nominals(array(x_nominal, nx, "x_nominal"));
+  }));
 }
 
 }  // extern "C"

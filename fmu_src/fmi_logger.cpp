@@ -21,6 +21,10 @@ void FmiLogger::event(std::string_view message) const {
   if (tells_events()) sink_(Severity::ok, event_category, harmless(message).c_str());
 }
 
+void FmiLogger::discard(std::string_view message) const {
+  if (tells_events()) sink_(Severity::discard, discard_category, harmless(message).c_str());
+}
+
 bool FmiLogger::choose(bool on, std::span<const char* const> categories) {
   bool events = categories.empty();
   for (const char* name : categories) {

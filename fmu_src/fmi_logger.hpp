@@ -9,7 +9,7 @@
 
 namespace mixed_order_game {
 
-enum class Severity { ok, warning, error };
+enum class Severity { ok, warning, discard, error };
 
 struct LogCategory {
   const char* name;
@@ -17,13 +17,15 @@ struct LogCategory {
 };
 
 /// Declared in modelDescription.xml.
-inline constexpr std::array<LogCategory, 3> log_categories{{
+inline constexpr std::array<LogCategory, 4> log_categories{{
     {"logStatusError", "Calls that were refused and integrations that failed, with the reason"},
+    {"logStatusDiscard", "Times and states at which the model has no finite values, with the variable"},
     {"logEvents", "Course of the run: initialization, integration statistics at its end"},
     {"logAll", "All messages"},
 }};
 inline constexpr const char* error_category = log_categories[0].name;
-inline constexpr const char* event_category = log_categories[1].name;
+inline constexpr const char* discard_category = log_categories[1].name;
+inline constexpr const char* event_category = log_categories[2].name;
 
 /// The text with '%' and '#' replaced, which importers take for formats and value references, and control characters
 /// turned into blanks.
@@ -39,6 +41,8 @@ class FmiLogger {
   /// Errors are always told.
   void error(std::string_view message) const;
   void event(std::string_view message) const;
+  /// An integrator tries again with a shorter step, so that this is told together with events.
+  void discard(std::string_view message) const;
   [[nodiscard]] bool tells_events() const { return events_on_ && sink_ != nullptr; }
 
   /// No categories mean all. False, and nothing changes, when one of them is unknown.

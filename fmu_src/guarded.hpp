@@ -16,7 +16,8 @@ namespace mixed_order_game {
 
 /// An instance as an entry point sees it.
 struct Component {
-  Component(FmiLogger with_logger, Model model) : logger(std::move(with_logger)), instance(std::move(model)) {}
+  Component(FmiLogger with_logger, Model model, Interface interface)
+      : logger(std::move(with_logger)), instance(std::move(model), interface) {}
 
   FmiLogger logger;
   Instance instance;
@@ -40,14 +41,19 @@ class FloatingPointEnvironment {
   std::fenv_t host_{};
 };
 
-/// Runs action(); true when it returned. Whatever it throws is told to the logger.
+enum class Outcome { done, discarded, refused };
+
+/// Runs action(). Whatever it throws is told to the logger.
 template <typename Action>
-bool contained(const FmiLogger& logger, const char* function, Action action) noexcept {
+Outcome contained(const FmiLogger& logger, const char* function, Action action) noexcept {
   const FloatingPointEnvironment environment;
   try {
     try {
       action();
-      return true;
+      return Outcome::done;
+    } catch (const NotComputable& reason) {
+      logger.discard(std::string(function) + ": " + reason.what());
+      return Outcome::discarded;
     } catch (const std::exception& error) {
       logger.error(std::string(function) + ": " + error.what());
     } catch (...) {
@@ -55,19 +61,26 @@ bool contained(const FmiLogger& logger, const char* function, Action action) noe
     }
   } catch (...) {  // not even the message could be made
   }
-  return false;
+  return Outcome::refused;
 }
 
-/// Runs action(component) when the call is legal; true when it returned.
+/// Runs action(component) when the call is legal.
 template <typename Action>
-bool guarded(void* handle, Call call, const char* function, Action action) noexcept {
-  if (handle == nullptr) return false;
+Outcome guarded(void* handle, Call call, const char* function, Action action) noexcept {
+  if (handle == nullptr) return Outcome::refused;
   auto& component = *static_cast<Component*>(handle);
   return contained(component.logger, function, [&] {
     const Phase phase = component.instance.phase();
-    if (call == Call::model_exchange) throw Error("belongs to model exchange, and this is a co-simulation slave");
+    const Interface interface = component.instance.interface();
+    if (!belongs_to(call, interface)) {
+      const Interface other =
+          interface == Interface::co_simulation ? Interface::model_exchange : Interface::co_simulation;
+      throw Error("belongs to " + std::string(name_of(other)) + ", and this instance was made for " +
+                  std::string(name_of(interface)));
+    }
     if (!is_legal(call, phase)) {
-      throw Error("not allowed in the state " + std::string(name_of(phase)) + ", only in " + legal_phases(call));
+      throw Error("not allowed in the state " + std::string(name_of(phase)) + ", only in " +
+                  legal_phases(call, interface));
     }
     action(component);
   });

@@ -36,10 +36,16 @@ void require_finite(Real value, const std::string& name) {
   throw Error(name + " is not finite (" + text_of(value) + "): the parameters or initial values are too large");
 }
 
+void require_length(std::size_t length, const char* what, std::size_t expected) {
+  if (length == expected) return;
+  throw Error("there are " + std::to_string(length) + " " + what + ", expected " + std::to_string(expected));
+}
+
 }  // namespace
 
-Instance::Instance(Model model)
+Instance::Instance(Model model, Interface interface)
     : model_(std::move(model)),
+      interface_(interface),
       settings_(model_.game),
       evaluation_(model_.game),
       directional_derivative_(model_, evaluation_.loop()),
@@ -48,6 +54,7 @@ Instance::Instance(Model model)
 
 Standing Instance::standing() const {
   if (co_simulation_) return co_simulation_->standing();
+  if (model_exchange_) return model_exchange_->standing();
   return {.time = experiment_.start_time, .state = initial_state_.data(), .modes = &initial_modes_, .statistics = {}};
 }
 
@@ -77,6 +84,12 @@ void Instance::exit_initialization() {
   if (!std::all_of(rate.begin(), rate.end(), [](Real value) { return std::isfinite(value); })) {
     throw Error("the initial rates are not finite: the parameters or initial values are too large");
   }
+  if (interface_ == Interface::model_exchange) {
+    model_exchange_.emplace(evaluation_,
+                            ModelExchange::Point{experiment_.start_time, initial_state_, initial_modes_, 0});
+    phase_ = Phase::event_mode;
+    return;
+  }
   auto run = std::make_unique<CoSimulation>(evaluation_);
   run->start(experiment_.start_time, tolerances(), model_.variables.save(settings_));
   co_simulation_ = std::move(run);
@@ -88,7 +101,8 @@ void Instance::reset() {
   settings_ = Settings(model_.game);
   experiment_ = {};
   co_simulation_.reset();
-  touched_ = true;
+  model_exchange_.reset();
+  touched_ = Change::parameters;
   failed_ = false;
   evaluation_.moved();
   evaluation_.costs_changed();
@@ -121,7 +135,9 @@ void Instance::get(Type type, std::span<const std::uint32_t> references, Real* v
   for (std::size_t k = 0; k < references.size(); ++k) {
     const auto reference = static_cast<int>(references[k]);
     scratch_[k] = variables.read(reference, source);
-    if (!std::isfinite(scratch_[k])) require_finite(scratch_[k], variables.name(reference));
+    if (std::isfinite(scratch_[k])) continue;
+    if (model_exchange_) throw NotComputable(variables.name(reference) + " is not finite");
+    require_finite(scratch_[k], variables.name(reference));
   }
   std::copy(scratch_.begin(), scratch_.end(), values);
 }
@@ -129,6 +145,7 @@ void Instance::get(Type type, std::span<const std::uint32_t> references, Real* v
 void Instance::set(Type type, std::span<const std::uint32_t> references, const Real* values) {
   const ModelVariables& variables = model_.variables;
   bool equilibrium_moved = false;
+  Change change = Change::none;
   for (std::size_t k = 0; k < references.size(); ++k) {
     const int reference = known(references[k], type);
     const Family& family = variables.family(reference);
@@ -140,16 +157,17 @@ void Instance::set(Type type, std::span<const std::uint32_t> references, const R
                   std::string(expectation(family.range)));
     }
     equilibrium_moved = equilibrium_moved || family.moves_equilibrium;
+    change = std::max(change, family.causality == Causality::input ? Change::input : Change::parameters);
   }
   for (std::size_t k = 0; k < references.size(); ++k) {
     const auto reference = static_cast<int>(references[k]);
     variables.family(reference).write(settings_, variables.variable(reference).slot, values[k]);
   }
-  if (!references.empty()) settings_changed(equilibrium_moved);
+  settings_changed(change, equilibrium_moved);
 }
 
-void Instance::settings_changed(bool equilibrium_moved) {
-  touched_ = true;
+void Instance::settings_changed(Change change, bool equilibrium_moved) {
+  touched_ = std::max(touched_, change);
   if (equilibrium_moved) evaluation_.costs_changed();
 }
 
@@ -173,7 +191,7 @@ void Instance::set_input_derivatives(std::span<const std::uint32_t> references, 
   for (std::size_t k = 0; k < references.size(); ++k) {
     set_input_derivative(variables.variable(static_cast<int>(references[k])).slot, orders[k], values[k]);
   }
-  if (!references.empty()) settings_changed(false);
+  if (!references.empty()) settings_changed(Change::input, false);
 }
 
 // The polynomial set before goes on from here with one derivative changed. An input without derivatives is stored
@@ -263,12 +281,16 @@ void Instance::read_along(std::span<const std::uint32_t> references, const View&
   std::copy(scratch_.begin(), scratch_.end(), values);
 }
 
-/// The settings act: at once as long as nothing runs, from the next step on in a run.
+/// The settings act: at once, but from the next step on while co-simulation runs.
 void Instance::act() {
-  if (co_simulation_ || !touched_) return;
-  evaluation_.act(settings_);
-  evaluation_.loop().initial_state(initial_state_.data());
-  touched_ = false;
+  if (co_simulation_ || touched_ == Change::none) return;
+  if (touched_ == Change::parameters) {
+    evaluation_.act(settings_);
+  } else {
+    evaluation_.act(settings_.input);
+  }
+  if (!model_exchange_) evaluation_.loop().initial_state(initial_state_.data());
+  touched_ = Change::none;
 }
 
 void Instance::prepare(const Stages& needed) {
@@ -301,12 +323,12 @@ void Instance::do_step(Real t, Real h) {
   const Real end = co_simulation_->end_of_step(t, h, experiment_.stop_time);
   Change change = Change::none;
   std::vector<Real> numbers;
-  if (touched_) {
+  if (touched_ != Change::none) {
     numbers = model_.variables.save(settings_);
     change = co_simulation_->change_to(numbers, model_.variables.saved_parameters());
     if (change == Change::parameters) check_settings();
   }
-  touched_ = false;
+  touched_ = Change::none;
   evaluation_.moved();
   try {
     if (change == Change::parameters) evaluation_.act(settings_);
@@ -320,24 +342,106 @@ void Instance::do_step(Real t, Real h) {
   }
 }
 
+bool Instance::new_discrete_states() {
+  act();
+  return model_exchange_->update_modes();
+}
+
+void Instance::enter_continuous_time_mode() {
+  check_settings();
+  phase_ = Phase::continuous_time_mode;
+}
+
+// Integrators evaluate the model beyond the stop time and interpolate back, so that not the time is judged but the
+// step. They locate where an event indicator changes its sign. An indicator that is positive when a step is complete
+// was passed over; what is due is then done at once.
+bool Instance::completed_integrator_step() {
+  const Real t = model_exchange_->standing().time;
+  const auto& [tolerance, start, stop] = experiment_;
+  if (stop && t > *stop + time_tolerance(t, *stop - start)) {
+    throw Error("the step ends at " + text_of(t) + ", after the stop time " + text_of(*stop));
+  }
+  const std::span<const Real> indicators = event_indicators();
+  return std::any_of(indicators.begin(), indicators.end(), [](Real indicator) { return indicator > 0.0; });
+}
+
+void Instance::set_time(Real t) {
+  if (!std::isfinite(t)) throw Error("the time was set to " + text_of(t) + ", expected a finite number");
+  model_exchange_->set_time(t);
+}
+
+void Instance::set_continuous_states(std::span<const Real> state) {
+  require_length(state.size(), "continuous states", initial_state_.size());
+  for (std::size_t k = 0; k < state.size(); ++k) {
+    if (std::isfinite(state[k])) continue;
+    throw Error(model_.variables.name(model_.variables.states()[k]) + " was set to " + text_of(state[k]) +
+                ", expected a finite number");
+  }
+  model_exchange_->set_state(state);
+}
+
+void Instance::get_continuous_states(std::span<Real> state) {
+  require_length(state.size(), "continuous states", initial_state_.size());
+  act();
+  std::copy_n(standing().state, state.size(), state.begin());
+}
+
+void Instance::get_derivatives(std::span<Real> rate) {
+  require_length(rate.size(), "derivatives", initial_state_.size());
+  act();
+  evaluation_.prepare_signals(standing());
+  for (std::size_t k = 0; k < rate.size(); ++k) {
+    if (std::isfinite(evaluation_.rate()[k])) continue;
+    throw NotComputable("the derivative of " + model_.variables.name(model_.variables.states()[k]) + " is not finite");
+  }
+  std::copy(evaluation_.rate().begin(), evaluation_.rate().end(), rate.begin());
+}
+
+std::span<const Real> Instance::event_indicators() {
+  act();
+  scratch_.resize(initial_modes_.size());
+  evaluation_.event_indicators(standing(), scratch_.data());
+  if (!std::all_of(scratch_.begin(), scratch_.end(), [](Real value) { return std::isfinite(value); })) {
+    throw NotComputable("an event indicator is not finite");
+  }
+  return scratch_;
+}
+
+void Instance::get_event_indicators(std::span<Real> values) {
+  require_length(values.size(), "event indicators", initial_modes_.size());
+  std::ranges::copy(event_indicators(), values.begin());
+}
+
+void Instance::get_nominals(std::span<Real> nominals) const {
+  require_length(nominals.size(), "nominal values", initial_state_.size());
+  for (std::size_t k = 0; k < nominals.size(); ++k) {
+    nominals[k] = model_.variables.family(model_.variables.states()[k]).nominal;
+  }
+}
+
 Snapshot Instance::save() const {
   if (failed_) throw Error("there is no state to save after a failed integration");
   Snapshot snapshot;
+  snapshot.interface = interface_;
   snapshot.phase = phase_;
   snapshot.experiment = experiment_;
   snapshot.settings = model_.variables.save(settings_);
   if (co_simulation_) snapshot.co_simulation = co_simulation_->save();
+  if (model_exchange_) snapshot.model_exchange = model_exchange_->save();
   return snapshot;
 }
 
-SnapshotSizes Instance::snapshot_sizes() const {
-  return {.settings = model_.variables.saved_size(), .states = initial_state_.size(), .modes = initial_modes_.size()};
+SnapshotShape Instance::snapshot_shape() const {
+  return {.interface = interface_,
+          .settings = model_.variables.saved_size(),
+          .states = initial_state_.size(),
+          .modes = initial_modes_.size()};
 }
 
 bool Instance::restore(const Snapshot& snapshot) {
   model_.variables.load(snapshot.settings, settings_);
   experiment_ = snapshot.experiment;
-  touched_ = true;
+  touched_ = Change::parameters;
   failed_ = false;
   evaluation_.moved();
   evaluation_.costs_changed();
@@ -346,6 +450,11 @@ bool Instance::restore(const Snapshot& snapshot) {
     repeated = restore(*snapshot.co_simulation);
   } else {
     co_simulation_.reset();
+  }
+  if (snapshot.model_exchange) {
+    model_exchange_.emplace(evaluation_, *snapshot.model_exchange);
+  } else {
+    model_exchange_.reset();
   }
   phase_ = snapshot.phase;
   return repeated;

@@ -7,6 +7,7 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -17,20 +18,28 @@
 #include "evaluation.hpp"
 #include "lifecycle.hpp"
 #include "model.hpp"
+#include "model_exchange.hpp"
 #include "settings.hpp"
 #include "snapshot.hpp"
 
 namespace mixed_order_game {
 
+/// The model has no finite values at this time and state.
+class NotComputable : public Error {
+ public:
+  using Error::Error;
+};
+
 class Instance {
  public:
-  explicit Instance(Model model);
+  explicit Instance(Model model, Interface interface);
   Instance(const Instance&) = delete;  // the integrator refers to its members
   Instance& operator=(const Instance&) = delete;
 
   [[nodiscard]] const Model& model() const { return model_; }
+  [[nodiscard]] Interface interface() const { return interface_; }
   [[nodiscard]] Phase phase() const { return phase_; }
-  /// Time of the last communication point, s.
+  /// Of the last communication point, or as the importer set it, s.
   [[nodiscard]] Real time() const { return standing().time; }
   [[nodiscard]] Statistics statistics() const { return standing().statistics; }
 
@@ -48,14 +57,28 @@ class Instance {
   void get_directional_derivative(std::span<const std::uint32_t> unknowns, std::span<const std::uint32_t> knowns,
                                   const Real* changes, Real* derivatives);
 
-  /// Moves from the communication point t to t + h.
+  /// Co-simulation: moves from the communication point t to t + h.
   void do_step(Real t, Real h);
+
+  // Model exchange; get_derivatives and get_event_indicators throw NotComputable where these are not finite.
+  void enter_event_mode() { phase_ = Phase::event_mode; }
+  /// True when the state moved.
+  bool new_discrete_states();
+  void enter_continuous_time_mode();
+  /// True when event mode has to be entered.
+  bool completed_integrator_step();
+  void set_time(Real t);
+  void set_continuous_states(std::span<const Real> state);
+  void get_continuous_states(std::span<Real> state);
+  void get_derivatives(std::span<Real> rate);
+  void get_event_indicators(std::span<Real> values);
+  void get_nominals(std::span<Real> nominals) const;
 
   [[nodiscard]] Snapshot save() const;
   /// False when this machine's arithmetic does not repeat the steps that led to the saved state bit for bit; the run
   /// then goes on from that state with a restart of the integrator.
   bool restore(const Snapshot& snapshot);
-  [[nodiscard]] SnapshotSizes snapshot_sizes() const;
+  [[nodiscard]] SnapshotShape snapshot_shape() const;
 
  private:
   using Stages = std::array<bool, static_cast<std::size_t>(Stage::equilibrium) + 1>;
@@ -67,22 +90,26 @@ class Instance {
   void prepare(const Stages& needed);
   [[nodiscard]] View prepare_tangent(std::span<const std::uint32_t> references);
   void read_along(std::span<const std::uint32_t> references, const View& source, const Tangent& tangent, Real* values);
-  void settings_changed(bool equilibrium_moved);
+  void settings_changed(Change change, bool equilibrium_moved);
   void set_input_derivative(int slot, int order, Real value);
   void check_settings();
+  std::span<const Real> event_indicators();
   bool restore(const CoSimulation::Point& point);
 
   Model model_;
+  Interface interface_;
   Phase phase_ = Phase::instantiated;
   bool failed_ = false;
   Experiment experiment_;
-  Settings settings_;    // as the importer set them
-  bool touched_ = true;  // they may differ from those that act
+  Settings settings_;                    // as the importer set them
+  Change touched_ = Change::parameters;  // what may differ from those that act
   Evaluation evaluation_;
   DirectionalDerivative directional_derivative_;
   AlignedVector initial_state_;
   Modes initial_modes_;
-  std::unique_ptr<CoSimulation> co_simulation_;  // once the run has begun
+  // once the run has begun, one of them
+  std::unique_ptr<CoSimulation> co_simulation_;
+  std::optional<ModelExchange> model_exchange_;
   std::vector<Real> scratch_;
 };
 

@@ -1,5 +1,6 @@
 #include "lifecycle.hpp"
 
+#include <algorithm>
 #include <iterator>
 
 namespace mixed_order_game {
@@ -10,17 +11,28 @@ constexpr unsigned bit(Phase phase) { return 1U << static_cast<unsigned>(phase);
 
 constexpr unsigned fresh = bit(Phase::instantiated);
 constexpr unsigned initializing = bit(Phase::initialization);
-constexpr unsigned running = bit(Phase::step_complete);
+constexpr unsigned stepping = bit(Phase::step_complete);
+constexpr unsigned at_event = bit(Phase::event_mode);
+constexpr unsigned continuous = bit(Phase::continuous_time_mode);
+constexpr unsigned running = stepping | at_event | continuous;
 constexpr unsigned ended = bit(Phase::terminated);
 constexpr unsigned failed = bit(Phase::error);
 constexpr unsigned always = fresh | initializing | running | ended | failed;
 
-// The standard's table for co-simulation. Allowed beyond it, because importers rely on it and nothing is lost:
-// reading any variable before initialization ends, setting inputs and reading or restoring states right after
-// instantiation, and all that still makes sense after a failed integration.
+constexpr unsigned bit(Interface interface) { return 1U << static_cast<unsigned>(interface); }
+
+constexpr unsigned co_simulation = bit(Interface::co_simulation);
+constexpr unsigned model_exchange = bit(Interface::model_exchange);
+constexpr unsigned both = co_simulation | model_exchange;
+
+// The standard's tables for co-simulation and model exchange. Allowed beyond them, because importers rely on it and
+// nothing is lost: reading any variable before initialization ends, setting inputs and reading or restoring states
+// right after instantiation, reading derivatives in initialization mode and nominal values in every state, and all that
+// still makes sense after a failed integration.
 struct CallRule {
   Call call;
   unsigned legal;
+  unsigned interfaces = both;
 };
 constexpr CallRule call_rules[] = {
     {Call::set_debug_logging, always},
@@ -36,12 +48,21 @@ constexpr CallRule call_rules[] = {
     {Call::free_state, always},
     {Call::serialize_state, always},
     {Call::get_directional_derivative, initializing | running | ended},
-    {Call::set_input_derivatives, fresh | initializing | running},
-    {Call::get_output_derivatives, running | ended | failed},
-    {Call::do_step, running},
-    {Call::cancel_step, 0},  // only while an asynchronous step runs, and there are none
-    {Call::get_status, always},
-    {Call::model_exchange, 0},
+    {Call::set_input_derivatives, fresh | initializing | stepping, co_simulation},
+    {Call::get_output_derivatives, stepping | ended | failed, co_simulation},
+    {Call::do_step, stepping, co_simulation},
+    {Call::cancel_step, 0, co_simulation},  // only while an asynchronous step runs, and there are none
+    {Call::get_status, always, co_simulation},
+    {Call::enter_event_mode, at_event | continuous, model_exchange},
+    {Call::new_discrete_states, at_event, model_exchange},
+    {Call::enter_continuous_time_mode, at_event, model_exchange},
+    {Call::completed_integrator_step, continuous, model_exchange},
+    {Call::set_time, at_event | continuous, model_exchange},
+    {Call::set_continuous_states, continuous, model_exchange},
+    {Call::get_continuous_states, initializing | at_event | continuous | ended, model_exchange},
+    {Call::get_derivatives, initializing | at_event | continuous | ended, model_exchange},
+    {Call::get_event_indicators, initializing | at_event | continuous | ended, model_exchange},
+    {Call::get_nominals, always, model_exchange},
 };
 
 struct VariableRule {
@@ -51,20 +72,20 @@ struct VariableRule {
 };
 constexpr VariableRule variable_rules[] = {
     {Causality::parameter, Variability::fixed, fresh | initializing},
-    {Causality::parameter, Variability::tunable, fresh | initializing | running},
+    {Causality::parameter, Variability::tunable, fresh | initializing | stepping | at_event},
     {Causality::input, Variability::continuous, fresh | initializing | running},
 };
 
-constexpr std::string_view phase_names[] = {"instantiated", "initialization mode", "step complete", "terminated",
+constexpr std::string_view phase_names[] = {"instantiated", "initialization mode",  "step complete",
+                                            "event mode",   "continuous-time mode", "terminated",
                                             "error"};
 static_assert(std::size(phase_names) == phases);
-static_assert(std::size(call_rules) == static_cast<std::size_t>(Call::model_exchange) + 1);
+static_assert(std::size(call_rules) == static_cast<std::size_t>(Call::get_nominals) + 1);
 
-unsigned legal_in(Call call) {
-  for (const CallRule& rule : call_rules) {
-    if (rule.call == call) return rule.legal;
-  }
-  return 0;
+const CallRule& rule_of(Call call) {
+  const auto* found = std::find_if(std::begin(call_rules), std::end(call_rules),
+                                   [&](const CallRule& rule) { return rule.call == call; });
+  return *found;
 }
 
 }  // namespace
@@ -87,12 +108,15 @@ std::string_view kind_of(const Family& family) {
   return "";
 }
 
-bool is_legal(Call call, Phase phase) { return (legal_in(call) & bit(phase)) != 0; }
+bool is_legal(Call call, Phase phase) { return (rule_of(call).legal & bit(phase)) != 0; }
 
-std::string legal_phases(Call call) {
+bool belongs_to(Call call, Interface interface) { return (rule_of(call).interfaces & bit(interface)) != 0; }
+
+std::string legal_phases(Call call, Interface interface) {
+  const unsigned of_the_other = interface == Interface::co_simulation ? at_event | continuous : stepping;
   std::string text;
   for (int phase = 0; phase < phases; ++phase) {
-    if (!is_legal(call, static_cast<Phase>(phase))) continue;
+    if ((rule_of(call).legal & ~of_the_other & bit(static_cast<Phase>(phase))) == 0) continue;
     text += (text.empty() ? "" : " or ") + std::string(phase_names[phase]);
   }
   return text.empty() ? "no state" : text;
@@ -118,5 +142,9 @@ std::string why_not_settable(const Family& family, Phase phase) {
 }
 
 std::string_view name_of(Phase phase) { return phase_names[static_cast<std::size_t>(phase)]; }
+
+std::string_view name_of(Interface interface) {
+  return interface == Interface::co_simulation ? "co-simulation" : "model exchange";
+}
 
 }  // namespace mixed_order_game

@@ -19,6 +19,9 @@ struct Model {
   /// Throws GameError when the text is not a valid game.
   explicit Model(std::string_view toml);
 
+  /// Needs all states as variables.
+  [[nodiscard]] bool offers_model_exchange() const { return !variables.states().empty(); }
+
   Game game;
   ModelVariables variables;
   std::string guid;

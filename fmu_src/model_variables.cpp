@@ -648,6 +648,14 @@ ModelVariables::ModelVariables(const Game& game) : order_(game.parameters.shape.
   for (int reference = 0; reference < size(); ++reference) {
     if (family(reference).causality == Causality::parameter) settable_.push_back(reference);
   }
+  if (game.expose == Expose::all) {
+    states_.resize(at(StateLayout(game.parameters.shape).size()));
+    for (int reference = 0; reference < size(); ++reference) {
+      if (const int first = family(reference).state; first >= 0) {
+        states_[at(first + variable(reference).slot)] = reference;
+      }
+    }
+  }
   input_numbers_ = ExternalDisturbance(game.parameters.shape.actions()).numbers().size();
 }
 

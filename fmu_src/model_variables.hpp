@@ -92,6 +92,9 @@ class ModelVariables {
   /// Value reference of an element by its slot, when it is a variable.
   [[nodiscard]] std::optional<int> find(std::string_view family, int slot) const;
 
+  /// Value references of the states in the order of the state vector; empty unless all of them are variables.
+  [[nodiscard]] const std::vector<int>& states() const { return states_; }
+
   [[nodiscard]] Real read(int reference, const View& view) const {
     return family(reference).read(view, variable(reference).slot);
   }
@@ -109,6 +112,7 @@ class ModelVariables {
   std::vector<Family> families_;
   std::vector<Variable> variables_;
   std::vector<int> settable_;  // parameters that can be set
+  std::vector<int> states_;
   std::size_t input_numbers_ = 0;
   std::vector<int> order_;  // of the players
 };

@@ -18,6 +18,9 @@ struct Settings {
   ExternalDisturbance input;      ///< d_ext
 };
 
+/// What differs between two sets of settings; parameters include inputs.
+enum class Change { none, input, parameters };
+
 /// What has to be computed before a variable can be read.
 enum class Stage {
   settings,     ///< nothing

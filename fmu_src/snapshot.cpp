@@ -13,7 +13,7 @@ namespace mixed_order_game {
 namespace {
 
 constexpr std::string_view magic = "MOGstate";
-constexpr std::uint32_t format = 1;
+constexpr std::uint32_t format = 2;
 constexpr std::size_t fingerprint_size = 16;
 
 class Writer {
@@ -123,15 +123,8 @@ void write_statistics(Writer& writer, const Statistics& statistics) {
   }
 }
 
-void write_payload(Writer& writer, const Snapshot& snapshot) {
-  writer.byte(static_cast<std::uint8_t>(snapshot.phase));
-  writer.optional(snapshot.experiment.tolerance);
-  writer.number(snapshot.experiment.start_time);
-  writer.optional(snapshot.experiment.stop_time);
-  writer.numbers(snapshot.settings);
-  writer.byte(snapshot.co_simulation ? 1 : 0);
-  if (!snapshot.co_simulation) return;
-  const auto& [acting, checkpoint] = *snapshot.co_simulation;
+void write_co_simulation(Writer& writer, const CoSimulation::Point& point) {
+  const auto& [acting, checkpoint] = point;
   writer.numbers(acting);
   writer.number(checkpoint.restart_time);
   writer.numbers(checkpoint.restart_state);
@@ -142,6 +135,43 @@ void write_payload(Writer& writer, const Snapshot& snapshot) {
   writer.numbers(checkpoint.state);
   write_modes(writer, checkpoint.modes);
   write_statistics(writer, checkpoint.statistics);
+}
+
+void write_model_exchange(Writer& writer, const ModelExchange::Point& point) {
+  writer.number(point.time);
+  writer.numbers(point.state);
+  write_modes(writer, point.modes);
+  writer.number(point.events);
+}
+
+void write_payload(Writer& writer, const Snapshot& snapshot) {
+  writer.byte(static_cast<std::uint8_t>(snapshot.interface));
+  writer.byte(static_cast<std::uint8_t>(snapshot.phase));
+  writer.optional(snapshot.experiment.tolerance);
+  writer.number(snapshot.experiment.start_time);
+  writer.optional(snapshot.experiment.stop_time);
+  writer.numbers(snapshot.settings);
+  writer.byte(snapshot.co_simulation || snapshot.model_exchange ? 1 : 0);
+  if (snapshot.co_simulation) write_co_simulation(writer, *snapshot.co_simulation);
+  if (snapshot.model_exchange) write_model_exchange(writer, *snapshot.model_exchange);
+}
+
+bool may_be_saved(Phase phase, Interface interface, bool has_run) {
+  switch (phase) {
+    case Phase::instantiated:
+    case Phase::initialization:
+      return !has_run;
+    case Phase::step_complete:
+      return has_run && interface == Interface::co_simulation;
+    case Phase::event_mode:
+    case Phase::continuous_time_mode:
+      return has_run && interface == Interface::model_exchange;
+    case Phase::terminated:
+      return has_run;
+    case Phase::error:
+      return false;
+  }
+  return false;
 }
 
 std::int64_t read_count(Reader& reader) {
@@ -162,32 +192,44 @@ void read_statistics(Reader& reader, Statistics& statistics) {
   }
 }
 
-Checkpoint read_checkpoint(Reader& reader, const SnapshotSizes& sizes) {
+Checkpoint read_checkpoint(Reader& reader, const SnapshotShape& shape) {
   Checkpoint checkpoint;
   checkpoint.restart_time = reader.real();
-  reader.numbers(sizes.states, checkpoint.restart_state);
-  read_modes(reader, sizes.modes, checkpoint.restart_modes);
+  reader.numbers(shape.states, checkpoint.restart_state);
+  read_modes(reader, shape.modes, checkpoint.restart_modes);
   read_statistics(reader, checkpoint.restart_statistics);
   checkpoint.steps_since_restart = read_count(reader);
   checkpoint.time = reader.real();
-  reader.numbers(sizes.states, checkpoint.state);
-  read_modes(reader, sizes.modes, checkpoint.modes);
+  reader.numbers(shape.states, checkpoint.state);
+  read_modes(reader, shape.modes, checkpoint.modes);
   read_statistics(reader, checkpoint.statistics);
   if (checkpoint.time < checkpoint.restart_time) Reader::refuse("its times are out of order");
   return checkpoint;
 }
 
+ModelExchange::Point read_model_exchange(Reader& reader, const SnapshotShape& shape) {
+  ModelExchange::Point point;
+  point.time = reader.real();
+  reader.numbers(shape.states, point.state);
+  read_modes(reader, shape.modes, point.modes);
+  point.events = read_count(reader);
+  return point;
+}
+
 }  // namespace
 
 std::size_t serialized_size(const Snapshot& snapshot, std::string_view guid) {
-  // phase, experiment, settings, flag
-  std::size_t size = 1 + 9 + 8 + 9 + 8 + 8 * snapshot.settings.size() + 1;
+  // interface, phase, experiment, settings, flag
+  std::size_t size = 1 + 1 + 9 + 8 + 9 + 8 + 8 * snapshot.settings.size() + 1;
   if (snapshot.co_simulation) {
     const auto& [acting, checkpoint] = *snapshot.co_simulation;
     constexpr std::size_t statistics = 5 * 8;
     size += 8 + 8 * acting.size() + 8;
     size += 8 + 8 * checkpoint.restart_state.size() + 8 + checkpoint.restart_modes.size() + statistics + 8;
     size += 8 + 8 + 8 * checkpoint.state.size() + 8 + checkpoint.modes.size() + statistics;
+  }
+  if (snapshot.model_exchange) {
+    size += 8 + 8 + 8 * snapshot.model_exchange->state.size() + 8 + snapshot.model_exchange->modes.size() + 8;
   }
   return magic.size() + 4 + 4 + guid.size() + 8 + size + fingerprint_size;
 }
@@ -203,7 +245,7 @@ std::vector<char> to_bytes(const Snapshot& snapshot, std::string_view guid) {
   return std::move(writer.bytes());
 }
 
-Snapshot from_bytes(std::span<const char> bytes, std::string_view guid, const SnapshotSizes& sizes) {
+Snapshot from_bytes(std::span<const char> bytes, std::string_view guid, const SnapshotShape& shape) {
   Reader reader(bytes);
   if (reader.text(magic.size()) != magic) Reader::refuse("they do not begin as one");
   if (const auto version = reader.number(4); version != format) {
@@ -222,21 +264,25 @@ Snapshot from_bytes(std::span<const char> bytes, std::string_view guid, const Sn
   }
 
   Snapshot snapshot;
+  if (reader.byte() != static_cast<std::uint8_t>(shape.interface)) {
+    Reader::refuse("they do not come from " + std::string(name_of(shape.interface)));
+  }
+  snapshot.interface = shape.interface;
   const std::uint8_t phase = reader.byte();
   if (phase >= phases) Reader::refuse("its phase is unknown");
   snapshot.phase = static_cast<Phase>(phase);
   snapshot.experiment.tolerance = reader.optional();
   snapshot.experiment.start_time = reader.real();
   snapshot.experiment.stop_time = reader.optional();
-  reader.numbers(sizes.settings, snapshot.settings);
-  if (reader.boolean()) {
+  reader.numbers(shape.settings, snapshot.settings);
+  const bool has_run = reader.boolean();
+  if (!may_be_saved(snapshot.phase, shape.interface, has_run)) Reader::refuse("its phase and content do not match");
+  if (has_run && shape.interface == Interface::co_simulation) {
     CoSimulation::Point& point = snapshot.co_simulation.emplace();
-    reader.numbers(sizes.settings, point.acting);
-    point.checkpoint = read_checkpoint(reader, sizes);
-  }
-  const bool has_run = snapshot.phase == Phase::step_complete || snapshot.phase == Phase::terminated;
-  if (snapshot.phase == Phase::error || has_run != snapshot.co_simulation.has_value()) {
-    Reader::refuse("its phase and content do not match");
+    reader.numbers(shape.settings, point.acting);
+    point.checkpoint = read_checkpoint(reader, shape);
+  } else if (has_run) {
+    snapshot.model_exchange = read_model_exchange(reader, shape);
   }
   if (reader.left() != fingerprint_size) Reader::refuse("they are longer than their content");
   return snapshot;

@@ -9,26 +9,25 @@
 #include <vector>
 
 #include "co_simulation.hpp"
+#include "experiment.hpp"
 #include "lifecycle.hpp"
+#include "model_exchange.hpp"
 
 namespace mixed_order_game {
 
-/// What the importer said about the run.
-struct Experiment {
-  std::optional<Real> tolerance;
-  Real start_time = 0.0;
-  std::optional<Real> stop_time;
-};
-
 struct Snapshot {
+  Interface interface = Interface::co_simulation;
   Phase phase = Phase::instantiated;
   Experiment experiment;
-  std::vector<Real> settings;                        ///< as ModelVariables::save gives them
-  std::optional<CoSimulation::Point> co_simulation;  ///< once the run has begun
+  std::vector<Real> settings;  ///< as ModelVariables::save gives them
+  // once the run has begun, one of them
+  std::optional<CoSimulation::Point> co_simulation;
+  std::optional<ModelExchange::Point> model_exchange;
 };
 
-/// The lengths that a snapshot of one model has.
-struct SnapshotSizes {
+/// What the snapshots of one instance have in common.
+struct SnapshotShape {
+  Interface interface = Interface::co_simulation;
   std::size_t settings = 0;
   std::size_t states = 0;
   std::size_t modes = 0;
@@ -36,7 +35,7 @@ struct SnapshotSizes {
 
 std::size_t serialized_size(const Snapshot& snapshot, std::string_view guid);
 std::vector<char> to_bytes(const Snapshot& snapshot, std::string_view guid);
-/// Throws Error, saying why, when the bytes are not a snapshot of this model.
-Snapshot from_bytes(std::span<const char> bytes, std::string_view guid, const SnapshotSizes& sizes);
+/// Throws Error, saying why, when the bytes are not a snapshot of this model and interface.
+Snapshot from_bytes(std::span<const char> bytes, std::string_view guid, const SnapshotShape& shape);
 
 }  // namespace mixed_order_game

@@ -52,8 +52,20 @@ void write_head(xml_node root, const Model& model) {
   attribute(root, "license", "BSD-3-Clause, see documentation/licenses");
   attribute(root, "generationTool", tool);
   attribute(root, "variableNamingConvention", "structured");
-  attribute(root, "numberOfEventIndicators", "0");
+  const int columns = model.offers_model_exchange() ? model.game.parameters.shape.actions() : 0;
+  attribute(root, "numberOfEventIndicators", std::to_string(columns));
 
+  if (model.offers_model_exchange()) {
+    xml_node model_exchange = root.append_child("ModelExchange");
+    attribute(model_exchange, "modelIdentifier", model_identifier);
+    attribute(model_exchange, "needsExecutionTool", "false");
+    attribute(model_exchange, "completedIntegratorStepNotNeeded", "false");
+    attribute(model_exchange, "canBeInstantiatedOnlyOncePerProcess", "false");
+    attribute(model_exchange, "canNotUseMemoryManagementFunctions", "true");
+    attribute(model_exchange, "canGetAndSetFMUstate", "true");
+    attribute(model_exchange, "canSerializeFMUstate", "true");
+    attribute(model_exchange, "providesDirectionalDerivative", "true");
+  }
   xml_node co_simulation = root.append_child("CoSimulation");
   attribute(co_simulation, "modelIdentifier", model_identifier);
   attribute(co_simulation, "needsExecutionTool", "false");

@@ -83,28 +83,6 @@ TEST(Behaviour20Lifecycle, InputsCanBeSetAndAllReadRightAfterInstantiate) {
   EXPECT_EQ(slave.all().size(), static_cast<std::size_t>(slave.model().variables.size()));
 }
 
-TEST(Behaviour20Lifecycle, ModelExchangeIsRefusedWithItsReason) {
-  Slave slave;
-  const fmi2Component c = slave.component;
-  double values[100] = {};
-  fmi2Boolean flag = 0;
-  fmi2EventInfo info{};
-  const auto refused = [&](fmi2Status status) {
-    EXPECT_EQ(status, fmi2Error);
-    EXPECT_NE(slave.last_message().find("model exchange"), std::string::npos) << slave.last_message();
-  };
-  refused(fmi2EnterEventMode(c));
-  refused(fmi2NewDiscreteStates(c, &info));
-  refused(fmi2EnterContinuousTimeMode(c));
-  refused(fmi2CompletedIntegratorStep(c, fmi2True, &flag, &flag));
-  refused(fmi2SetTime(c, 0.0));
-  refused(fmi2SetContinuousStates(c, values, 100));
-  refused(fmi2GetDerivatives(c, values, 100));
-  refused(fmi2GetEventIndicators(c, values, 100));
-  refused(fmi2GetContinuousStates(c, values, 100));
-  refused(fmi2GetNominalsOfContinuousStates(c, values, 100));
-}
-
 TEST(Behaviour20FailedIntegration, IsAnErrorFromWhichResetAndRestoreHelp) {
   Slave slave(exploding_game());
   const fmi2Component c = slave.component;
@@ -319,8 +297,6 @@ TEST(Behaviour24Instantiate, SurvivesMissingArguments) {
       }
     }
   }
-  EXPECT_EQ(fmi2Instantiate("name", fmi2ModelExchange, guid.c_str(), uri.c_str(), &empty, fmi2False, fmi2False),
-            nullptr);
 }
 
 TEST(Behaviour24Instantiate, TellsWhyNot) {

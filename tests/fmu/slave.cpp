@@ -169,14 +169,14 @@ void record(fmi2ComponentEnvironment log, fmi2String instance, fmi2Status status
   static_cast<std::vector<LogEntry>*>(log)->push_back({instance, status, category, message});
 }
 
-Slave::Slave(const std::string& game, bool logging) : model_(game) {
+Slave::Slave(const std::string& game, bool logging, fmi2Type type) : model_(game) {
   callbacks_.logger = record;
   callbacks_.componentEnvironment = &log;
   for (int k = 0; k < model_.variables.size(); ++k) {
     references_[element_name(model_.variables, k)] = static_cast<fmi2ValueReference>(k);
   }
-  component = fmi2Instantiate("slave", fmi2CoSimulation, model_.guid.c_str(), ("file://" + resources_of(game)).c_str(),
-                              &callbacks_, fmi2False, logging ? fmi2True : fmi2False);
+  component = fmi2Instantiate("slave", type, model_.guid.c_str(), ("file://" + resources_of(game)).c_str(), &callbacks_,
+                              fmi2False, logging ? fmi2True : fmi2False);
   if (component == nullptr) throw std::runtime_error("not instantiated: " + last_message());
 }
 

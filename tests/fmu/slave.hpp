@@ -41,7 +41,7 @@ void record(fmi2ComponentEnvironment log, fmi2String instance, fmi2Status status
 
 class Slave {
  public:
-  explicit Slave(const std::string& game = small_game(), bool logging = false);
+  explicit Slave(const std::string& game = small_game(), bool logging = false, fmi2Type type = fmi2CoSimulation);
   ~Slave();
   Slave(const Slave&) = delete;
   Slave& operator=(const Slave&) = delete;

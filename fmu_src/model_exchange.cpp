@@ -1,0 +1,47 @@
+#include "model_exchange.hpp"
+
+#include <algorithm>
+#include <utility>
+
+namespace mixed_order_game {
+
+ModelExchange::ModelExchange(Evaluation& evaluation, Point start) : evaluation_(evaluation), point_(std::move(start)) {
+  evaluation_.moved();
+}
+
+Standing ModelExchange::standing() const {
+  Statistics statistics;
+  statistics.events = point_.events;
+  return {point_.time, point_.state.data(), &point_.modes, statistics};
+}
+
+void ModelExchange::set_time(Real t) {
+  if (t == point_.time) return;
+  point_.time = t;
+  evaluation_.moved();
+}
+
+void ModelExchange::set_state(std::span<const Real> state) {
+  if (std::equal(state.begin(), state.end(), point_.state.begin(), point_.state.end())) return;
+  std::copy(state.begin(), state.end(), point_.state.begin());
+  evaluation_.moved();
+}
+
+bool ModelExchange::update_modes() {
+  const ClosedLoop& loop = evaluation_.loop();
+  evaluation_.prepare_signals(standing());
+  AlignedVector norm2(point_.modes.size());
+  loop.weight_norms(point_.state.data(), norm2.data());
+  Modes modes = point_.modes;
+  loop.resolve_modes(norm2.data(), evaluation_.signals(), modes);
+  for (std::size_t p = 0; p < modes.size(); ++p) point_.events += modes[p] != point_.modes[p] ? 1 : 0;
+  AlignedVector state = point_.state;
+  loop.project(modes, state.data());
+  const bool moved = state != point_.state;
+  if (moved || modes != point_.modes) evaluation_.moved();
+  point_.state = std::move(state);
+  point_.modes = std::move(modes);
+  return moved;
+}
+
+}  // namespace mixed_order_game

@@ -1,0 +1,40 @@
+// A run by the importer's integrator: the importer sets time and state, the instance holds the modes of the weight
+// columns, which change in event mode only.
+#pragma once
+
+#include <cstdint>
+#include <span>
+
+#include "evaluation.hpp"
+
+namespace mixed_order_game {
+
+class ModelExchange {
+ public:
+  /// All that a run consists of besides the settings.
+  struct Point {
+    Real time = 0.0;
+    AlignedVector state;
+    Modes modes;
+    std::int64_t events = 0;  ///< columns that entered or left the sphere
+  };
+
+  /// The evaluation must outlive the run.
+  ModelExchange(Evaluation& evaluation, Point start);
+
+  [[nodiscard]] Standing standing() const;
+  void set_time(Real t);
+  void set_state(std::span<const Real> state);
+
+  /// Gives each column the mode that it has from here on and puts the state where the modes say it is: a column that
+  /// enters lies exactly on the sphere then. True when that moved the state.
+  bool update_modes();
+
+  [[nodiscard]] const Point& save() const { return point_; }
+
+ private:
+  Evaluation& evaluation_;
+  Point point_;
+};
+
+}  // namespace mixed_order_game
