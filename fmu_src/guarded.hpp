@@ -2,7 +2,15 @@
 // inside, tells the reason, and keeps the host's floating-point environment out of the calculation and untouched.
 #pragma once
 
+#if defined(__x86_64__)
+// All arithmetic is in SSE registers, and their control word is all that counts: a tenth of a microsecond cheaper than
+// what the standard library saves with it.
+#include <xmmintrin.h>
+#define MIXED_ORDER_GAME_SSE
+#else
 #include <cfenv>
+#endif
+
 #include <exception>
 #include <memory>
 #include <string>
@@ -30,15 +38,30 @@ struct Component {
 class FloatingPointEnvironment {
  public:
   FloatingPointEnvironment() {
+#ifdef MIXED_ORDER_GAME_SSE
+    _mm_setcsr(default_control);
+#else
     std::fegetenv(&host_);
     std::fesetenv(FE_DFL_ENV);
+#endif
   }
-  ~FloatingPointEnvironment() { std::fesetenv(&host_); }
+  ~FloatingPointEnvironment() {
+#ifdef MIXED_ORDER_GAME_SSE
+    _mm_setcsr(host_);
+#else
+    std::fesetenv(&host_);
+#endif
+  }
   FloatingPointEnvironment(const FloatingPointEnvironment&) = delete;
   FloatingPointEnvironment& operator=(const FloatingPointEnvironment&) = delete;
 
  private:
+#ifdef MIXED_ORDER_GAME_SSE
+  static constexpr unsigned default_control = 0x1f80;  // all exceptions masked, to nearest, no flush to zero
+  unsigned host_ = _mm_getcsr();
+#else
   std::fenv_t host_{};
+#endif
 };
 
 enum class Outcome { done, discarded, refused };
