@@ -91,6 +91,8 @@ def peers(context: Context, reference: PaperReference) -> dict[str, Solve]:
 
     game, times = read_game(PAPER_GAME), reference.times
     found: dict[str, Solve] = {"CasADi CVODES": CasadiCvodes(game, times, reference.switches).solve}
+    csparse = CasadiCvodes(game, times, reference.switches, linear_solver="csparse")
+    found["CasADi CVODES, csparse"] = csparse.solve
     if context.jit:
         found["CasADi CVODES, compiled"] = CasadiCvodes(game, times, reference.switches, jit=True).solve
     found["scikit-sundae CVODE"] = SundaeCvode(game, times).solve
