@@ -5,6 +5,7 @@
 #include <limits>
 #include <set>
 
+#include "importer.hpp"
 #include "model_structure.hpp"
 #include "reference_loop.hpp"
 #include "slave.hpp"
@@ -340,6 +341,60 @@ TEST_P(DirectionalDerivativeOfRandomGame, IsThatOfTheInitialValues) {
 
 INSTANTIATE_TEST_SUITE_P(Assorted, DirectionalDerivativeOfRandomGame, ::testing::ValuesIn(recipes()),
                          [](const auto& instance) { return "seed" + std::to_string(instance.param.seed); });
+
+// In model exchange the FMU itself can be moved: every pair against its own rates and outputs, columns on the sphere
+// and inside.
+TEST(DirectionalDerivative, OfModelExchangeIsThatOfRatesAndOutputs) {
+  constexpr double h = 1e-3;
+  for (const std::string& game : {small_game_with({{"epsilon = 0.05", "epsilon = 1.0"}}), vector_centers_game()}) {
+    Importer importer(game);
+    const Model& model = importer.model();
+    importer.begin(0.4);
+    importer.integrate(0.9, 1e-3);
+    const auto unknowns = names_where(model, Equations::running, is_unknown);
+    const auto unknown_references = references(importer, unknowns);
+    const auto read = [&] {
+      std::vector<double> values(unknowns.size());
+      EXPECT_EQ(fmi2GetReal(importer.component, unknown_references.data(), values.size(), values.data()), fmi2OK)
+          << importer.last_message();
+      return values;
+    };
+    const double t = importer.time;
+    const std::vector<double> state = importer.state();
+    const Table table = all_pairs(importer, Equations::running);
+    const Dependencies declared = dependencies_of(model, Equations::running);
+    expect_zero_where_not_declared(table, declared);
+    std::map<std::string, std::size_t> position;
+    const ModelStructure structure = model_structure(model);
+    for (std::size_t k = 0; k < structure.derivatives.size(); ++k) {
+      const std::string name = model.variables.name(structure.derivatives[k].reference);
+      position[name.substr(4, name.size() - 5)] = k;  // of der(x)
+    }
+    Table expected;
+    for (const std::string& known : names_where(model, Equations::running, is_known)) {
+      const auto moved = [&](double shift) {
+        std::vector<double> other = state;
+        if (position.contains(known)) other[position.at(known)] += shift;
+        importer.move_to(known == "time" ? t + shift : t, other);
+        if (known.starts_with("d_ext")) {
+          EXPECT_EQ(importer.set(known, shift), fmi2OK) << importer.last_message();
+        }
+        return read();
+      };
+      const std::vector<double> near[] = {moved(h), moved(-h)};
+      const std::vector<double> far[] = {moved(2.0 * h), moved(-2.0 * h)};
+      moved(0.0);
+      for (std::size_t k = 0; k < unknowns.size(); ++k) {
+        expected[known][unknowns[k]] = (8.0 * (near[0][k] - near[1][k]) - (far[0][k] - far[1][k])) / (12.0 * h);
+      }
+    }
+    expect_close(table, expected, 1e-7);
+    importer.move_to(t, state);
+    EXPECT_EQ(all_pairs(importer, Equations::running), table);
+    ASSERT_EQ(fmi2EnterEventMode(importer.component), fmi2OK);
+    EXPECT_EQ(all_pairs(importer, Equations::running), table) << "in event mode as well";
+  }
+}
 
 // Every declared dependency acts somewhere, and is of the kind that is declared: the same number always (constant), as
 // long as parameters stay (tunable), or not (dependent).
