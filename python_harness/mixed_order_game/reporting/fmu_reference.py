@@ -64,7 +64,8 @@ DERIVATIVES = """## Directional derivatives and dependencies
   `w'w`.
 - With respect to `time`, inputs stand still. A known that is named twice changes by the sum.
 - At `x = x_star` the derivative of `nash_error` is defined as 0.
-- In a run parameters are those that act; what was set since the last step acts from the next one.
+- In a run parameters are those that act: in co-simulation what was set since the last step acts from the next
+  one, in model exchange at once.
 
 The model structure lists a dependency exactly where this derivative is not zero for some state and some
 values of the parameters that can be set. An edge of weight zero counts, because it can be set; a term that
