@@ -3,8 +3,8 @@
 #pragma once
 
 #if defined(__x86_64__)
-// All arithmetic is in SSE registers, and their control word is all that counts: a tenth of a microsecond cheaper than
-// what the standard library saves with it.
+// All arithmetic is in SSE registers, but the C library reads the rounding of decimal numbers from the x87 control
+// word. Both words are a tenth of a microsecond cheaper than the whole environment that the standard library saves.
 #include <xmmintrin.h>
 #define MIXED_ORDER_GAME_SSE
 #else
@@ -39,6 +39,8 @@ class FloatingPointEnvironment {
  public:
   FloatingPointEnvironment() {
 #ifdef MIXED_ORDER_GAME_SSE
+    asm volatile("fnstcw %0" : "=m"(host_x87_));
+    asm volatile("fldcw %0" : : "m"(default_x87));
     _mm_setcsr(default_control);
 #else
     std::fegetenv(&host_);
@@ -48,6 +50,7 @@ class FloatingPointEnvironment {
   ~FloatingPointEnvironment() {
 #ifdef MIXED_ORDER_GAME_SSE
     _mm_setcsr(host_);
+    asm volatile("fldcw %0" : : "m"(host_x87_));
 #else
     std::fesetenv(&host_);
 #endif
@@ -57,8 +60,10 @@ class FloatingPointEnvironment {
 
  private:
 #ifdef MIXED_ORDER_GAME_SSE
-  static constexpr unsigned default_control = 0x1f80;  // all exceptions masked, to nearest, no flush to zero
+  static constexpr unsigned default_control = 0x1f80;    // all exceptions masked, to nearest, no flush to zero
+  static constexpr unsigned short default_x87 = 0x037f;  // the same, with extended precision
   unsigned host_ = _mm_getcsr();
+  unsigned short host_x87_ = 0;
 #else
   std::fenv_t host_{};
 #endif
