@@ -4,7 +4,7 @@
 
 #if defined(__x86_64__)
 // All arithmetic is in SSE registers, but the C library reads the rounding of decimal numbers from the x87 control
-// word. Both words are a tenth of a microsecond cheaper than the whole environment that the standard library saves.
+// word. Both words are a quarter of a microsecond cheaper than the whole environment that the standard library saves.
 #include <xmmintrin.h>
 #define MIXED_ORDER_GAME_SSE
 #else

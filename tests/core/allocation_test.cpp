@@ -6,6 +6,7 @@
 
 #include "game.hpp"
 #include "integrator.hpp"
+#include "loop_tangent.hpp"
 #include "random_game.hpp"
 
 namespace {
@@ -60,6 +61,30 @@ TEST(Allocation, NoneAfterTheStart) {
       EXPECT_EQ(allocations, 0) << "game " << recipe.seed;
       EXPECT_GT(integrator.statistics().steps, 50);
     }
+  }
+}
+
+TEST(Allocation, NoneAlongADirection) {
+  for (const testing::Recipe& recipe : testing::assorted_recipes()) {
+    const ClosedLoop loop(parse_game(testing::toml_of(testing::random_game(recipe))).parameters);
+    const Modes inside(at(loop.shape().actions()));
+    const std::vector<Real> input(inside.size(), 1.0);
+    Signals signals(loop.shape());
+    LoopJacobian jacobian(loop);
+    LoopTangent tangent(loop);
+    std::vector<Real> state(tangent.state.size());
+    std::vector<Real> rate(state.size());
+    loop.initial_state(state.data());
+    allocations = 0;
+    counting = true;
+    loop.evaluate(0.1, state.data(), input.data(), inside, signals, rate.data());
+    jacobian.linearize(state.data(), signals, inside);
+    tangent.state.back() = 1.0;
+    tangent.follow_state(jacobian);
+    tangent.add_input(input.data());
+    tangent.add_time(0.1, 1.0);
+    counting = false;
+    EXPECT_EQ(allocations, 0) << "game " << recipe.seed;
   }
 }
 
