@@ -8,10 +8,19 @@ set(icon ${PROJECT_SOURCE_DIR}/modelDescription/model.png)
 set(description ${PROJECT_BINARY_DIR}/fmu/modelDescription.xml)
 set(archive ${PROJECT_BINARY_DIR}/fmu/MixedOrderGame.fmu)
 
-if(CMAKE_SYSTEM_NAME STREQUAL "Linux" AND CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
-  set(platform linux64)
+# Name of this platform, and the folders in which importers look for its library: FMI 2.0 names none for Arm.
+if(APPLE)
+  set(platform darwin64)
+elseif(WIN32)
+  set(platform win64)
+elseif(CMAKE_SYSTEM_PROCESSOR MATCHES "aarch64|arm64")
+  set(platform aarch64-linux)
 else()
-  string(TOLOWER "${CMAKE_SYSTEM_PROCESSOR}-${CMAKE_SYSTEM_NAME}" platform)
+  set(platform linux64)
+endif()
+set(binaries --binary ${platform}=$<TARGET_FILE:MixedOrderGame>)
+if(platform STREQUAL "aarch64-linux")
+  list(APPEND binaries --binary linux64=$<TARGET_FILE:MixedOrderGame>)
 endif()
 
 # Licences of everything that is linked into the binary.
@@ -30,6 +39,7 @@ endfunction()
 collect_license(sundials /usr/share/doc/libsundials-dev/copyright "${sundials_SOURCE_DIR}/LICENSE")
 collect_license(eigen /usr/share/doc/libeigen3-dev/copyright "${eigen_SOURCE_DIR}/COPYING.MPL2")
 collect_license(tomlplusplus /usr/share/doc/libtomlplusplus-dev/copyright "${tomlplusplus_SOURCE_DIR}/LICENSE")
+collect_license(pugixml /usr/share/doc/libpugixml-dev/copyright "${pugixml_SOURCE_DIR}/LICENSE.md")  # in the host tool
 string(REGEX MATCH "^[0-9]+" gcc_version "${CMAKE_CXX_COMPILER_VERSION}")
 collect_license(libstdc++ /usr/share/doc/libstdc++-${gcc_version}-dev/copyright
                 /usr/share/doc/gcc-${gcc_version}-base/copyright)
@@ -44,14 +54,13 @@ add_custom_command(
 add_custom_command(
   OUTPUT ${archive}
   COMMAND ${Python_EXECUTABLE} ${packaging} --model-description ${description} --game ${game}
-          --binary ${platform}=$<TARGET_FILE:MixedOrderGame> --documentation ${documentation} --licenses ${licenses}
-          --icon ${icon} --output ${archive}
+          ${binaries} --documentation ${documentation} --licenses ${licenses} --icon ${icon} --output ${archive}
   DEPENDS MixedOrderGame ${description} ${game} ${packaging} ${packed} ${icon}
   VERBATIM)
 add_custom_target(fmu ALL DEPENDS ${archive})
 
 install(TARGETS MixedOrderGame LIBRARY DESTINATION mixed_order_game/_native/binaries/${platform})
-install(TARGETS mixed-order-game-description RUNTIME DESTINATION mixed_order_game/_native)
+install(TARGETS mixed-order-game-description RUNTIME DESTINATION mixed_order_game/_native/tools/${platform})
 install(DIRECTORY ${documentation}/ DESTINATION mixed_order_game/_native/documentation)
 install(DIRECTORY ${licenses}/ DESTINATION mixed_order_game/_native/licenses)
 install(FILES ${icon} DESTINATION mixed_order_game/_native)

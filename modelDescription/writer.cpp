@@ -3,6 +3,7 @@
 #include <unistd.h>
 
 #include <cstdio>
+#include <filesystem>
 #include <fstream>
 #include <iostream>
 #include <string>
@@ -27,6 +28,12 @@ constexpr const char* usage =
     "Exit code: 0 fine, 1 the game is not valid or a file cannot be read or written, 2 wrong usage.\n";
 
 enum Exit { fine = 0, failure = 1, wrong_usage = 2 };
+
+// Arguments come in the system's own code on Windows; the project's paths are UTF-8.
+std::string utf8(const char* argument) {
+  const std::u8string text = std::filesystem::path(argument).u8string();
+  return {text.begin(), text.end()};
+}
 
 void write_whole(const std::string& path, const std::string& text) {
   const std::string unfinished = path + "." + std::to_string(getpid()) + ".tmp";
@@ -69,7 +76,7 @@ int main(int argc, char** argv) {
     std::cerr << usage;
     return wrong_usage;
   }
-  const std::string game = argv[optind];
+  const std::string game = utf8(argv[optind]);
   try {
     std::string toml;
     try {

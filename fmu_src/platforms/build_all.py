@@ -12,13 +12,13 @@ import os
 import shutil
 import subprocess
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 
 from . import binary_table, exercise
 from .fingerprint import fingerprint
-from .mach_o import write_universal
+from .mach_o import keep_exports, universal
 from .sources import PUGIXML, SUNDIALS, sources
 from .targets import LIEF, TARGETS, ZIGLANG, PlatformError, Target
 
@@ -29,10 +29,10 @@ PACKAGING = ROOT / "python_harness" / "mixed_order_game" / "packaging.py"
 PLATFORMS = ("linux64", "win64", "darwin64", "aarch64-linux")
 ARCHIVE = "MixedOrderGame.fmu"
 ARM_ARCHIVE = "MixedOrderGame-arm-linux64.fmu"
-"""For importers that look in linux64 on Arm Linux too."""
+"""For 64-bit Arm Linux, where most importers look in linux64 too."""
 
 TOOL = "mixed-order-game-description"
-"""Host tool of installed packages, which wheels take from here."""
+"""Host tool of installed packages: wheels take it from the folder tools."""
 
 WRAPPER = """\
 #!/bin/sh
@@ -79,7 +79,7 @@ class Build:
             raise PlatformError(f"{self.description} is missing: run ./dev build first")
         self.headers = _fmi_headers()
         folder.mkdir(parents=True, exist_ok=True)
-        self.ziglang = self._install_tools()
+        self.ziglang = self._install_packages()
         self._write_wrappers()
         self.sundials, origin = sources(SUNDIALS, folder / "sources", sundials)
         say(origin)
@@ -121,17 +121,27 @@ class Build:
         """The small FMI host for a platform."""
         return self.folder / platform / ("host.exe" if platform == "win64" else "host")
 
+    def tool(self, platform: str) -> Path:
+        """The host tool for a platform."""
+        return self.folder / "tools" / platform / (TOOL + (".exe" if platform == "win64" else ""))
+
     def finish(self, platform: str) -> Path:
-        """Put the library of a compiled platform into binaries/<platform>/."""
+        """Put a compiled platform's library and host tool into binaries/<platform>/ and tools/<platform>/."""
         parts = [target for target in TARGETS if target.platform == platform]
         library = self.folder / "binaries" / platform / parts[0].library
         library.parent.mkdir(parents=True, exist_ok=True)
+        tool = self.tool(platform)
+        tool.parent.mkdir(parents=True, exist_ok=True)
+        made = [self.folder / target.name / "modelDescription" / tool.name for target in parts]
         if platform == "darwin64":
-            write_universal(library, [self.library(target) for target in parts], "_fmi2")
+            library.write_bytes(
+                universal(keep_exports(self.library(target).read_bytes(), "_fmi2") for target in parts)
+            )
+            tool.write_bytes(universal(path.read_bytes() for path in made))
         else:
             shutil.copyfile(self.library(parts[0]), library)
-        if platform == "linux64":
-            shutil.copy(self.folder / platform / "modelDescription" / TOOL, self.folder / TOOL)
+            shutil.copyfile(made[0], tool)
+        tool.chmod(0o755)
         return library
 
     def collect_licenses(self) -> Path:
@@ -170,20 +180,20 @@ class Build:
         subprocess.run(command, check=True)
         return archive
 
-    def _install_tools(self) -> Path:
-        tools = self.folder / "tools"
-        stamp = tools / "installed"
+    def _install_packages(self) -> Path:
+        packages = self.folder / "packages"
+        stamp = packages / "installed"
         wanted = f"{ZIGLANG} {LIEF}"
         if not stamp.is_file() or stamp.read_text(encoding="utf-8") != wanted:
-            say(f"Installing {wanted} into {tools}")
-            shutil.rmtree(tools, ignore_errors=True)
+            say(f"Installing {wanted} into {packages}")
+            shutil.rmtree(packages, ignore_errors=True)
             subprocess.run(
-                [sys.executable, "-m", "pip", "install", "--quiet", "--target", tools, ZIGLANG, LIEF],
+                [sys.executable, "-m", "pip", "install", "--quiet", "--target", packages, ZIGLANG, LIEF],
                 check=True,
             )
             stamp.write_text(wanted, encoding="utf-8")
-        sys.path.append(str(tools))
-        return tools / "ziglang"
+        sys.path.append(str(packages))
+        return packages / "ziglang"
 
     def _write_wrappers(self) -> None:
         """Commands for CMake, which wants one word for a compiler."""
@@ -279,24 +289,30 @@ def comparison_table(results: Mapping[str, Mapping[str, object]]) -> str:
     return "\n".join(lines)
 
 
-def build_all(build: Build) -> int:
+def build_all(build: Build, platforms: Collection[str] = PLATFORMS) -> int:
     """Make everything that can be made. Returns the number of things that went wrong."""
     wrong = []
     failed = set()
-    for target in TARGETS:
+    for target in (target for target in TARGETS if target.platform in platforms):
         try:
             build.compile(target)
         except PlatformError as error:
             wrong.append(str(error))
             failed.add(target.platform)
-    shutil.rmtree(build.folder / "binaries", ignore_errors=True)
-    libraries = {platform: build.finish(platform) for platform in PLATFORMS if platform not in failed}
+    for folder in ("binaries", "tools"):
+        shutil.rmtree(build.folder / folder, ignore_errors=True)
+    libraries = {
+        platform: build.finish(platform)
+        for platform in PLATFORMS
+        if platform in platforms and platform not in failed
+    }
     if not libraries:
         raise PlatformError("; ".join(wrong))
     licenses = build.collect_licenses()
     archives = [build.pack(ARCHIVE, libraries, licenses)]
     if "aarch64-linux" in libraries:
-        archives.append(build.pack(ARM_ARCHIVE, {"linux64": libraries["aarch64-linux"]}, licenses))
+        arm = libraries["aarch64-linux"]
+        archives.append(build.pack(ARM_ARCHIVE, {"aarch64-linux": arm, "linux64": arm}, licenses))
 
     rows, complaints = examine(build, libraries)
     results, failures = compare_runs(build, libraries)
@@ -315,8 +331,8 @@ def build_all(build: Build) -> int:
         say(f"{archive} ({archive.stat().st_size / 1e6:.1f} MB)")
     for text in wrong:
         say(f"wrong: {text}")
-    if failed:
-        say(f"The archive lacks {', '.join(sorted(failed))}.")
+    if lacking := [platform for platform in PLATFORMS if platform not in libraries]:
+        say(f"The archive lacks {', '.join(lacking)}.")
     return len(wrong)
 
 
@@ -326,11 +342,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--output", type=Path, default=ROOT / "build" / "platforms", metavar="DIR")
     parser.add_argument("--native", type=Path, default=ROOT / "build", metavar="DIR", help="the native build")
     parser.add_argument("--sundials", type=Path, metavar="DIR", help="SUNDIALS' sources, 6.4 to 7.x")
+    parser.add_argument(
+        "--platform",
+        action="append",
+        choices=PLATFORMS,
+        dest="platforms",
+        help="make this platform alone; repeatable",
+    )
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, metavar="N")
     options = parser.parse_args(arguments)
     try:
         build = Build(options.output.resolve(), options.native.resolve(), options.sundials, options.jobs)
-        return min(build_all(build), 1)
+        return min(build_all(build, options.platforms or PLATFORMS), 1)
     except (PlatformError, OSError, subprocess.CalledProcessError) as error:
         say(f"fmu-all: {error}")
         return 1

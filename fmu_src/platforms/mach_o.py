@@ -4,7 +4,6 @@ import hashlib
 import struct
 from collections.abc import Iterable, Mapping
 from os.path import commonprefix
-from pathlib import Path
 
 from .targets import PlatformError
 
@@ -57,7 +56,7 @@ def keep_exports(library: bytes, prefix: str) -> bytes:
 
 
 def universal(slices: Iterable[bytes]) -> bytes:
-    """One library of several processors: a header of big-endian numbers, and the slices behind it."""
+    """One file of several processors: a header of big-endian numbers, and the slices behind it."""
     slices = list(slices)
     page = 1 << PAGE_OF_SLICE
     result = bytearray(struct.pack(">2I", 0xCAFEBABE, len(slices)))
@@ -69,11 +68,6 @@ def universal(slices: Iterable[bytes]) -> bytes:
     for image in slices:
         result += bytes(-len(result) % page) + image
     return bytes(result)
-
-
-def write_universal(output: Path, slices: Iterable[Path], prefix: str) -> None:
-    """Join the libraries of single processors, with only the exports that begin with `prefix`."""
-    output.write_bytes(universal(keep_exports(path.read_bytes(), prefix) for path in slices))
 
 
 def _number(data: bytes, at: int) -> tuple[int, int]:

@@ -1,11 +1,12 @@
 """Makes an FMU from a game file: the host tool writes modelDescription.xml, packaging makes the archive.
 
-Every game shares one compiled binary; no compiler is needed. The package carries, in its folder `_native`,
-mixed-order-game-description (the host tool), binaries/<platform>/, documentation/, licenses/ and model.png;
-in its folder `games` the game files.
+Every game shares the compiled binaries; no compiler is needed. The package carries, in its folder `_native`,
+tools/<platform>/ with mixed-order-game-description (the host tool), binaries/<platform>/, documentation/,
+licenses/ and model.png, for this machine's platform or for all of them; in its folder `games` the game files.
 """
 
 import hashlib
+import platform
 import subprocess
 import sys
 import tempfile
@@ -19,11 +20,14 @@ DEFAULT_GAME = "five_vehicles"
 """The paper's example."""
 
 TOOL = "mixed-order-game-description"
+ARM_LINUX = "aarch64-linux"
 
 
-def build_fmu(game: Path | str, output: Path | str) -> Path:
+def build_fmu(game: Path | str, output: Path | str, *, arm_linux: bool | None = None) -> Path:
     """Make the FMU of a game file (TOML) and return the path written, `output`.
 
+    It holds the libraries of all platforms that the package carries. With `arm_linux`, the default on such a
+    machine, it is for 64-bit Arm Linux alone: its library lies in linux64 too, where most importers look.
     Equal inputs give equal bytes. Raises GameError if the file is missing or breaks the definition of a game,
     BuildError if the installation lacks the compiled parts or the archive cannot be written.
     """
@@ -33,13 +37,15 @@ def build_fmu(game: Path | str, output: Path | str) -> Path:
     native = native_directory()
     with tempfile.TemporaryDirectory(prefix="mixed-order-game-") as folder:
         description = Path(folder) / "modelDescription.xml"
-        _describe(native, game, description)
+        _describe(game, description)
         try:
             return write_fmu(
                 output,
                 model_description=description,
                 game=game,
-                binaries=_binaries(native),
+                binaries=_binaries(
+                    native, arm_linux=(_platform() == ARM_LINUX) if arm_linux is None else arm_linux
+                ),
                 documentation=native / "documentation",
                 licenses={path.name: path for path in sorted((native / "licenses").iterdir())},
                 icon=native / "model.png",
@@ -69,6 +75,7 @@ def cached_fmu(game: Path | str) -> Path:
         raise GameError(f"there is no game file {game}")
     fingerprint = hashlib.sha256(game.read_bytes())
     native = native_directory()
+    fingerprint.update(_platform().encode())
     for path in sorted(path for path in native.rglob("*") if path.is_file()):
         fingerprint.update(path.relative_to(native).as_posix().encode() + b"\0" + path.read_bytes())
     cache = platformdirs.user_cache_path("mixed-order-game")
@@ -129,24 +136,45 @@ def native_directory() -> Path:
     )
 
 
+def host_tool() -> Path:
+    """The program that judges games and writes modelDescription.xml. Raises BuildError if there is none."""
+    folder = native_directory() / "tools"
+    tool = folder / _platform() / (TOOL + (".exe" if _platform() == "win64" else ""))
+    if not tool.is_file():
+        raise BuildError(f"this installation carries no host tool for {_platform()}: {tool} is missing")
+    return tool
+
+
 def _package_folders() -> Iterator[Path]:
     """Folders of the package; an editable installation has two, the sources and the compiled parts."""
     yield from map(Path, sys.modules[__package__].__path__)
 
 
-def _binaries(native: Path) -> dict[str, Path]:
+def _platform() -> str:
+    """This machine's name among the folders of binaries and tools."""
+    named = {"Windows": "win64", "Darwin": "darwin64"}.get(platform.system(), "linux64")
+    return ARM_LINUX if named == "linux64" and platform.machine() in {"aarch64", "arm64"} else named
+
+
+def _binaries(native: Path, *, arm_linux: bool) -> dict[str, Path]:
     found = {path.parent.name: path for path in sorted(native.glob("binaries/*/MixedOrderGame.*"))}
     if not found:
         raise BuildError(f"there is no binary below {native / 'binaries'}")
-    return found
+    if not arm_linux:
+        return found
+    if ARM_LINUX not in found:
+        raise BuildError(f"this installation has binaries for {', '.join(found)}, but none for {ARM_LINUX}")
+    return dict.fromkeys((ARM_LINUX, "linux64"), found[ARM_LINUX])
 
 
-def _describe(native: Path, game: Path, output: Path) -> None:
+def _describe(game: Path, output: Path) -> None:
     """Run the host tool. It exits with 1 and one sentence on stderr for a bad game."""
-    tool = native / (TOOL + (".exe" if sys.platform == "win32" else ""))
+    tool = host_tool()
     command = [str(tool), str(game), "--output", str(output)]
     try:
-        finished = subprocess.run(command, capture_output=True, text=True, errors="replace", check=False)
+        finished = subprocess.run(
+            command, capture_output=True, encoding="utf-8", errors="replace", check=False
+        )
     except OSError as error:
         raise BuildError(f"cannot run {tool}: {error}") from error
     if finished.returncode == 1:

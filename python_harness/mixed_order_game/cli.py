@@ -101,6 +101,14 @@ def build(
     output: Annotated[Path, typer.Option("--output", "-o", help="The FMU to write.")] = Path(
         "MixedOrderGame.fmu"
     ),
+    arm_linux: Annotated[
+        bool | None,
+        typer.Option(
+            "--arm-linux",
+            help="For 64-bit Arm Linux alone: also in the folder linux64, where most importers look.",
+            show_default=False,
+        ),
+    ] = None,
 ) -> None:
     """Make an FMU from a game file. No compiler is needed.
 
@@ -108,7 +116,7 @@ def build(
     """
     from .build import build_fmu, default_game
 
-    typer.echo(build_fmu(default_game() if game is None else game_file(game), output))
+    typer.echo(build_fmu(default_game() if game is None else game_file(game), output, arm_linux=arm_linux))
 
 
 @app.command()

@@ -30,7 +30,14 @@ built = pytest.mark.skipif(
 each_platform = pytest.mark.parametrize("platform", build_all.PLATFORMS)
 
 
+def made() -> list[str]:
+    """The platforms that were asked for and could be made."""
+    return [platform for platform in build_all.PLATFORMS if (FOLDER / "binaries" / platform).is_dir()]
+
+
 def library(platform: str) -> Path:
+    if platform not in made():
+        pytest.skip(f"./dev fmu-all has not made {platform}")
     (path,) = (FOLDER / "binaries" / platform).iterdir()
     return path
 
@@ -59,9 +66,7 @@ def run(platform: str, description: Path) -> exercise.Run:
 def test_the_archive_holds_one_library_for_each_platform() -> None:
     with zipfile.ZipFile(FOLDER / build_all.ARCHIVE) as archive:
         names = [name for name in archive.namelist() if name.startswith("binaries/")]
-        assert sorted(names) == sorted(
-            f"binaries/{platform}/{library(platform).name}" for platform in build_all.PLATFORMS
-        )
+        assert sorted(names) == sorted(f"binaries/{platform}/{library(platform).name}" for platform in made())
         for name in names:
             assert archive.read(name) == (FOLDER / name).read_bytes()
 
@@ -70,8 +75,9 @@ def test_the_archive_holds_one_library_for_each_platform() -> None:
 def test_the_second_archive_has_the_arm_library_in_linux64() -> None:
     with zipfile.ZipFile(FOLDER / build_all.ARM_ARCHIVE) as archive:
         names = [name for name in archive.namelist() if name.startswith("binaries/")]
-        assert names == ["binaries/linux64/MixedOrderGame.so"]
-        assert archive.read(names[0]) == library("aarch64-linux").read_bytes()
+        assert names == [f"binaries/{folder}/MixedOrderGame.so" for folder in ("aarch64-linux", "linux64")]
+        for name in names:
+            assert archive.read(name) == library("aarch64-linux").read_bytes()
 
 
 @built
@@ -101,7 +107,7 @@ def test_a_library_exports_the_standard_and_needs_the_system_alone(
 ) -> None:
     from fmpy import __file__ as fmpy_file
 
-    monkeypatch.setattr(sys, "path", [*sys.path, str(FOLDER / "tools")])
+    monkeypatch.setattr(sys, "path", [*sys.path, str(FOLDER / "packages")])
     functions = binary_table.functions_of_the_standard(Path(fmpy_file).parent / "c-code")
     images = list(binary_table.images(platform, library(platform)))
     assert {image.processor for image in images} == binary_table.PROCESSORS[platform]
@@ -128,7 +134,7 @@ def test_a_library_computes_what_linux64_computes(
 def test_a_platform_that_fails_is_named_and_the_rest_is_made(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(sys, "path", [*sys.path, str(FOLDER / "tools")])
+    monkeypatch.setattr(sys, "path", [*sys.path, str(FOLDER / "packages")])
 
     class WithoutWindows(build_all.Build):
         def __init__(self) -> None:
@@ -137,7 +143,8 @@ def test_a_platform_that_fails_is_named_and_the_rest_is_made(
             with zipfile.ZipFile(FOLDER / build_all.ARCHIVE) as archive:
                 archive.extract("modelDescription.xml", tmp_path)
             for target in build_all.TARGETS:
-                (tmp_path / target.name).symlink_to(FOLDER / target.name)
+                if target.platform in made():
+                    (tmp_path / target.name).symlink_to(FOLDER / target.name)
             from fmpy import __file__ as fmpy_file
 
             self.headers = Path(fmpy_file).parent / "c-code"
@@ -150,11 +157,11 @@ def test_a_platform_that_fails_is_named_and_the_rest_is_made(
             return FOLDER / "licenses"
 
     monkeypatch.setattr(exercise, "launcher", lambda _: _nothing_runs())
-    assert build_all.build_all(WithoutWindows()) == 1
+    assert build_all.build_all(WithoutWindows(), [*made(), "win64"]) == 1
     assert "lacks win64" in capsys.readouterr().err
     with zipfile.ZipFile(tmp_path / build_all.ARCHIVE) as archive:
         platforms = {name.split("/")[1] for name in archive.namelist() if name.startswith("binaries/")}
-    assert platforms == {"linux64", "darwin64", "aarch64-linux"}
+    assert platforms == set(made()) - {"win64"}
 
 
 def _nothing_runs() -> tuple[list[str], str]:
@@ -174,6 +181,7 @@ def test_exports_are_filtered_and_found_again() -> None:
 @built
 def test_pages_are_hashed_as_the_linker_does() -> None:
     """The linker's own signature comes out again, so the one after the change of exports is right too."""
+    library("darwin64")
     image = (FOLDER / "darwin64-arm64" / "fmu_src" / "MixedOrderGame.dylib").read_bytes()
     again = bytearray(image)
     at = 32

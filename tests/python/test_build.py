@@ -1,5 +1,6 @@
 """FMUs of games: reproducible, one binary for every game, and bad games refused in one sentence."""
 
+import shutil
 import zipfile
 from pathlib import Path
 
@@ -85,6 +86,69 @@ def test_games_of_the_package(name: str, tmp_path: Path) -> None:
     assert read_model(build_fmu(build.shipped_game(name), tmp_path / f"{name}.fmu")).title
     with pytest.raises(GameError, match=f"there is no game {name}s; those that come with the package are"):
         build.shipped_game(f"{name}s")
+
+
+@pytest.fixture
+def every_platform(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """An installation with a library for each platform, and only this machine's host tool."""
+    native = build.native_directory()
+    package = tmp_path / "package"
+    shutil.copytree(native, package / "_native")
+    shutil.copytree(native.parent / "games", package / "games")
+    for platform in ("win64", "darwin64", "aarch64-linux"):
+        folder = package / "_native" / "binaries" / platform
+        folder.mkdir()
+        (folder / "MixedOrderGame.so").write_text(f"for {platform}")
+    monkeypatch.setattr(build, "_package_folders", lambda: iter([package]))
+    return package
+
+
+def binaries(fmu: Path) -> dict[str, bytes]:
+    with zipfile.ZipFile(fmu) as archive:
+        return {name.split("/")[1]: archive.read(name) for name in archive.namelist() if "binaries/" in name}
+
+
+@pytest.mark.usefixtures("every_platform")
+def test_every_library_of_the_package_is_packed(tmp_path: Path) -> None:
+    packed = binaries(build_fmu(default_game(), tmp_path / "a.fmu"))
+    assert set(packed) == {"linux64", "win64", "darwin64", "aarch64-linux"}
+
+
+@pytest.mark.usefixtures("every_platform")
+def test_arm_linux_has_its_library_in_both_folders(tmp_path: Path) -> None:
+    arm = b"for aarch64-linux"
+    packed = binaries(build_fmu(default_game(), tmp_path / "a.fmu", arm_linux=True))
+    assert packed == {"aarch64-linux": arm, "linux64": arm}
+
+
+def test_arm_linux_needs_its_library(tmp_path: Path) -> None:
+    with pytest.raises(BuildError, match="has binaries for linux64, but none for aarch64-linux"):
+        build_fmu(default_game(), tmp_path / "a.fmu", arm_linux=True)
+
+
+@pytest.mark.parametrize(
+    ("system", "machine", "platform"),
+    [
+        ("Linux", "x86_64", "linux64"),
+        ("Linux", "aarch64", "aarch64-linux"),
+        ("Windows", "AMD64", "win64"),
+        ("Windows", "ARM64", "win64"),
+        ("Darwin", "arm64", "darwin64"),
+    ],
+)
+def test_each_machine_runs_its_own_tool(
+    system: str, machine: str, platform: str, every_platform: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("platform.system", lambda: system)
+    monkeypatch.setattr("platform.machine", lambda: machine)
+    name = "mixed-order-game-description" + (".exe" if platform == "win64" else "")
+    tool = every_platform / "_native" / "tools" / platform / name
+    if platform != "linux64":
+        with pytest.raises(BuildError, match=f"carries no host tool for {platform}"):
+            build.host_tool()
+        tool.parent.mkdir()
+        tool.touch()
+    assert build.host_tool() == tool
 
 
 def test_installation_without_compiled_parts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -8,14 +8,13 @@ import difflib
 import math
 import re
 import subprocess
-import sys
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ..build import TOOL, native_directory
+from ..build import host_tool
 from ..errors import BuildError, GameError
 from .positions import Path as Entry
 from .positions import Positions
@@ -72,10 +71,14 @@ def check_game(game: Path | str) -> tuple[Problem, ...]:
 
 def _judge(game: Path) -> str | None:
     """The host tool's sentence about a game; None if it is valid."""
-    tool = native_directory() / (TOOL + (".exe" if sys.platform == "win32" else ""))
+    tool = host_tool()
     try:
         finished = subprocess.run(
-            [str(tool), "--check", str(game)], capture_output=True, text=True, errors="replace", check=False
+            [str(tool), "--check", str(game)],
+            capture_output=True,
+            encoding="utf-8",
+            errors="replace",
+            check=False,
         )
     except OSError as error:
         raise BuildError(f"cannot run {tool}: {error}") from error
