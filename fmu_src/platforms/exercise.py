@@ -6,7 +6,7 @@ import subprocess
 import tempfile
 import xml.etree.ElementTree as ET
 from dataclasses import dataclass
-from pathlib import Path, PurePosixPath
+from pathlib import Path
 from urllib.parse import quote
 
 from .targets import PlatformError
@@ -65,11 +65,30 @@ def launcher(platform: str) -> tuple[list[str], str]:
     raise PlatformError("nothing on Linux runs it")
 
 
+def run_there(
+    platform: str, program: Path, *arguments: str, wine_prefix: Path
+) -> subprocess.CompletedProcess[bytes]:
+    """Run a program of a platform. Raises PlatformError if that is impossible here."""
+    command, _ = launcher(platform)
+    wine = {"WINEDEBUG": "-all", "WINEPREFIX": str(wine_prefix.resolve()), "LC_ALL": "C.UTF-8"}
+    return subprocess.run(
+        [*command, str(program), *arguments],
+        env={**os.environ, **wine},
+        capture_output=True,
+        timeout=SECONDS,
+        check=False,
+    )
+
+
+def path_there(platform: str, path: Path) -> str:
+    """What a file of this machine is called on the platform."""
+    return ("Z:" if platform == "win64" else "") + str(path.resolve())
+
+
 def exercise(
     platform: str, host: Path, library: Path, description: Path, game: Path, *, runs: int = 0
 ) -> Run:
     """Run the host with a library. Raises PlatformError if that is impossible here or if the host fails."""
-    command, _ = launcher(platform)
     model = ET.parse(description).getroot()  # noqa: S314 (made by this build)
     references = [
         variable.attrib["valueReference"]
@@ -80,16 +99,9 @@ def exercise(
         resources = Path(temporary) / FOLDER
         resources.mkdir()
         shutil.copyfile(game, resources / "game.toml")
-        drive = "Z:" if platform == "win64" else ""
-        uri = "file:///" + (drive and drive + "/") + quote(str(PurePosixPath(resources))).lstrip("/")
-        path = drive + str(library.resolve())
-        done = subprocess.run(
-            [*command, str(host), path, model.attrib["guid"], uri, str(runs), *references],
-            env={**os.environ, "WINEDEBUG": "-all", "WINEPREFIX": str(_wine_prefix(host))},
-            capture_output=True,
-            timeout=SECONDS,
-            check=False,
-        )
+        uri = "file:///" + quote(path_there(platform, resources).lstrip("/"), safe="/:")
+        where = (path_there(platform, library), model.attrib["guid"], uri)
+        done = run_there(platform, host, *where, str(runs), *references, wine_prefix=host.parent / "wine")
     if done.returncode != 0:
         said = (done.stdout + done.stderr).decode(errors="replace").strip()
         raise PlatformError(f"{platform}: the host failed with {done.returncode}: {said}")
@@ -104,11 +116,6 @@ def compare(run: Run, reference: Run) -> Difference:
         largest=max(abs(a - b) for _, row, other in rows for a, b in zip(row, other, strict=True)),
         differs_from=next((t for t, row, other in rows if row != other), None),
     )
-
-
-def _wine_prefix(host: Path) -> Path:
-    """Wine's own folder, beside the build instead of in the user's home."""
-    return host.resolve().parent / "wine"
 
 
 def _read(lines: list[str]) -> Run:

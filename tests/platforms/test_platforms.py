@@ -6,6 +6,7 @@ MIXED_ORDER_GAME_PLATFORMS points.
 
 import io
 import os
+import shutil
 import struct
 import subprocess
 import sys
@@ -97,6 +98,13 @@ def test_the_checker_of_fmpy_finds_nothing() -> None:
     assert validate_fmu(str(FOLDER / build_all.ARM_ARCHIVE)) == []
 
 
+@built
+def test_libcosim_runs_the_archive() -> None:
+    from tests.python import test_second_importer
+
+    test_second_importer.test_libcosim_agrees_with_fmpy(FOLDER / build_all.ARCHIVE)
+
+
 # the libraries
 
 
@@ -128,6 +136,32 @@ def test_a_library_computes_what_linux64_computes(
     assert result.deserialized
     assert len(result.times) == 201
     assert exercise.compare(result, reference).largest <= PERMITTED
+
+
+@built
+@each_platform
+def test_a_host_tool_describes_the_game_as_the_native_one_does(
+    platform: str, description: Path, tmp_path: Path
+) -> None:
+    library(platform)
+    tool = FOLDER / "tools" / platform / (build_all.TOOL + (".exe" if platform == "win64" else ""))
+    folder = tmp_path / exercise.FOLDER
+    folder.mkdir()
+    game = shutil.copy(build_all.GAME, folder)
+    output = folder / "modelDescription.xml"
+    options = ("--output", exercise.path_there(platform, output))
+    try:
+        done = exercise.run_there(
+            platform,
+            tool,
+            *options,
+            exercise.path_there(platform, Path(game)),
+            wine_prefix=FOLDER / "win64" / "wine",
+        )
+    except PlatformError as reason:
+        pytest.skip(f"built, not run: {reason}")
+    assert done.returncode == 0, done.stderr.decode(errors="replace")
+    assert output.read_bytes() == description.read_bytes()
 
 
 @built
