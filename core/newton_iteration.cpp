@@ -8,16 +8,11 @@
 #include <new>
 
 #include "kernels/kernels.hpp"
+#include "sundials_handles.hpp"
 
 namespace mixed_order_game {
 
 namespace {
-
-#if SUNDIALS_VERSION_MAJOR < 7
-using SunBoolean = booleantype;
-#else
-using SunBoolean = sunbooleantype;
-#endif
 
 // The Jacobian is exact but for the coupling that the solver may leave out, so a fresh factorization contracts well.
 constexpr Real rate_after_factorization = 0.1;

@@ -1,0 +1,91 @@
+#include "sundials_handles.hpp"
+
+#include <nvector/nvector_serial.h>
+
+#include <algorithm>
+#include <cmath>
+#include <new>
+
+#include "errors.hpp"
+#include "kernels/kernels.hpp"
+#include "types.hpp"
+
+namespace mixed_order_game {
+
+namespace {
+
+// CVODE spends its time in a handful of vector operations: these replace the library's by the kernels.
+
+void vector_linear_sum(SunReal a, N_Vector x, SunReal b, N_Vector y, N_Vector z) {
+  kernels().linear_sum(NV_LENGTH_S(x), a, NV_DATA_S(x), b, NV_DATA_S(y), NV_DATA_S(z));
+}
+void vector_scale(SunReal c, N_Vector x, N_Vector z) { kernels().scale(NV_LENGTH_S(x), c, NV_DATA_S(x), NV_DATA_S(z)); }
+void vector_fill(SunReal c, N_Vector z) { kernels().fill(NV_LENGTH_S(z), c, NV_DATA_S(z)); }
+SunReal vector_weighted_norm(N_Vector x, N_Vector w) {
+  const SunIndex n = NV_LENGTH_S(x);
+  return std::sqrt(kernels().weighted_square_sum(n, NV_DATA_S(x), NV_DATA_S(w)) / static_cast<Real>(n));
+}
+
+// Operations on several vectors go block by block, so that each number is read from memory once.
+template <typename Action>
+void for_each_block(N_Vector vector, Action action) {
+  constexpr SunIndex block = 1024;
+  for (SunIndex begin = 0, n = NV_LENGTH_S(vector); begin < n; begin += block)
+    action(begin, std::min(block, n - begin));
+}
+int vector_scale_add_multi(int count, SunReal* a, N_Vector x, N_Vector* y, N_Vector* z) {
+  for_each_block(x, [&](SunIndex begin, SunIndex n) {
+    for (int k = 0; k < count; ++k) {
+      kernels().linear_sum(n, a[k], NV_DATA_S(x) + begin, 1.0, NV_DATA_S(y[k]) + begin, NV_DATA_S(z[k]) + begin);
+    }
+  });
+  return 0;
+}
+int vector_linear_combination(int count, SunReal* c, N_Vector* x, N_Vector z) {  // z may be x[0]
+  for_each_block(z, [&](SunIndex begin, SunIndex n) {
+    kernels().scale(n, c[0], NV_DATA_S(x[0]) + begin, NV_DATA_S(z) + begin);
+    for (int k = 1; k < count; ++k) {
+      kernels().linear_sum(n, c[k], NV_DATA_S(x[k]) + begin, 1.0, NV_DATA_S(z) + begin, NV_DATA_S(z) + begin);
+    }
+  });
+  return 0;
+}
+SunReal vector_max_norm(N_Vector x) { return kernels().max_norm(NV_LENGTH_S(x), NV_DATA_S(x)); }
+
+}  // namespace
+
+ContextHandle make_context() {
+  SUNContext context = nullptr;
+#if SUNDIALS_VERSION_MAJOR < 7
+  if (SUNContext_Create(nullptr, &context) != 0) throw Error("SUNDIALS could not make a context");
+#else
+  if (SUNContext_Create(SUN_COMM_NULL, &context) != 0) throw Error("SUNDIALS could not make a context");
+  SUNContext_ClearErrHandlers(context);
+#endif
+  SUNContext_SetLogger(context, nullptr);
+  return ContextHandle(context);
+}
+
+VectorHandle make_vector(int size, SUNContext context) {
+  N_Vector vector = N_VNew_Serial(size, context);
+  if (vector == nullptr) throw std::bad_alloc();
+  vector->ops->nvlinearsum = vector_linear_sum;
+  vector->ops->nvscale = vector_scale;
+  vector->ops->nvconst = vector_fill;
+  vector->ops->nvwrmsnorm = vector_weighted_norm;
+  vector->ops->nvmaxnorm = vector_max_norm;
+  vector->ops->nvscaleaddmulti = vector_scale_add_multi;
+  vector->ops->nvlinearcombination = vector_linear_combination;
+  N_VConst(0.0, vector);
+  return VectorHandle(vector);
+}
+
+MatrixHandle make_placeholder_matrix(SUNContext context) {
+  SUNMatrix matrix = SUNMatNewEmpty(context);
+  if (matrix == nullptr) throw std::bad_alloc();
+  matrix->ops->getid = [](SUNMatrix) { return SUNMATRIX_CUSTOM; };
+  matrix->ops->destroy = [](SUNMatrix stub) { SUNMatFreeEmpty(stub); };
+  return MatrixHandle(matrix);
+}
+
+}  // namespace mixed_order_game
