@@ -343,7 +343,7 @@ void Instance::do_step(Real t, Real h) {
 }
 
 bool Instance::new_discrete_states() {
-  act();
+  event_indicators();  // where they are not finite, no mode can be found
   return model_exchange_->update_modes();
 }
 

@@ -60,7 +60,7 @@ class Instance {
   /// Co-simulation: moves from the communication point t to t + h.
   void do_step(Real t, Real h);
 
-  // Model exchange; get_derivatives and get_event_indicators throw NotComputable where these are not finite.
+  // Model exchange; NotComputable is thrown where rates or event indicators are not finite.
   void enter_event_mode() { phase_ = Phase::event_mode; }
   /// True when the state moved.
   bool new_discrete_states();

@@ -1,6 +1,7 @@
 #include "model_exchange.hpp"
 
 #include <algorithm>
+#include <cstring>
 #include <utility>
 
 namespace mixed_order_game {
@@ -22,7 +23,7 @@ void ModelExchange::set_time(Real t) {
 }
 
 void ModelExchange::set_state(std::span<const Real> state) {
-  if (std::equal(state.begin(), state.end(), point_.state.begin(), point_.state.end())) return;
+  if (std::memcmp(state.data(), point_.state.data(), state.size_bytes()) == 0) return;
   std::copy(state.begin(), state.end(), point_.state.begin());
   evaluation_.moved();
 }

@@ -1,10 +1,13 @@
 // Model exchange: legal calls, hostile values, states on the sphere, and runs that equal co-simulation.
+#include <malloc.h>
+
 #include <algorithm>
 #include <cmath>
 #include <functional>
 #include <limits>
 #include <map>
 #include <set>
+#include <thread>
 
 #include "importer.hpp"
 
@@ -278,6 +281,11 @@ TEST(ModelExchangeStates, OverflowIsDiscardedSoThatTheImporterTriesAShorterStep)
   EXPECT_EQ(fmi2GetReal(importer.component, &norm2, 1, &value), fmi2Discard);
   for (const double untouched : values) EXPECT_EQ(untouched, 7.0);
   EXPECT_EQ(value, 7.0);
+  ASSERT_EQ(fmi2EnterEventMode(importer.component), fmi2OK);
+  fmi2EventInfo info{};
+  EXPECT_EQ(fmi2NewDiscreteStates(importer.component, &info), fmi2Discard);
+  EXPECT_EQ(importer.state(), huge) << "the weights are as they were set";
+  ASSERT_EQ(fmi2EnterContinuousTimeMode(importer.component), fmi2OK);
   importer.move_to(0.0, state);
   importer.integrate(0.1, 0.002);
   EXPECT_GT(importer.time, 0.09) << "the instance goes on";
@@ -642,6 +650,37 @@ TEST(ModelExchangeState, ForeignAndDamagedBytesAreRefused) {
     ASSERT_EQ(importer.deserialize_and_set(damaged), fmi2Error) << k;
   }
   EXPECT_TRUE(same_values(importer, importer.all(), before));
+}
+
+TEST(Behaviour05NoGrowth, SavingAndFreeingInModelExchange) {
+  Importer importer;
+  importer.begin();
+  const auto cycle = [&] {
+    fmi2FMUstate state = nullptr;
+    ASSERT_EQ(fmi2GetFMUstate(importer.component, &state), fmi2OK);
+    ASSERT_EQ(fmi2SetFMUstate(importer.component, state), fmi2OK);
+    ASSERT_EQ(importer.rate().size(), importer.states());
+    ASSERT_EQ(fmi2FreeFMUstate(importer.component, &state), fmi2OK);
+  };
+  for (int k = 0; k < 100; ++k) cycle();
+  const std::size_t before = mallinfo2().uordblks;
+  for (int k = 0; k < 2'000; ++k) cycle();
+  EXPECT_LE(mallinfo2().uordblks, before + 16384);
+}
+
+TEST(Behaviour21Instances, InThreadsAreIndependentInModelExchange) {
+  const auto course = [] {
+    Importer importer;
+    importer.begin();
+    importer.integrate(0.8, 0.004);
+    return importer.all();
+  };
+  const auto expected = course();
+  std::vector<std::vector<double>> seen(16);
+  std::vector<std::thread> threads;
+  for (auto& values : seen) threads.emplace_back([&] { values = course(); });
+  for (auto& thread : threads) thread.join();
+  for (const auto& values : seen) EXPECT_EQ(values, expected);
 }
 
 TEST(ModelExchangeState, ResetEqualsAFreshInstance) {
