@@ -130,8 +130,7 @@ Integrator::Implementation::Implementation(const ClosedLoop& loop, const Externa
       newton_(std::move(newton)),
       jacobian_(loop),
       size_(loop.layout().size()),
-      // about half a second of repetition; a restart costs some 25 steps, so large games pay a few percent for it
-      most_steps_between_restarts_(std::max<std::int64_t>(500, 20'000'000 / size_)),
+      most_steps_between_restarts_(most_steps_between_restarts(size_)),
       restart_state_(at(size_)),
       restart_modes_(at(loop.shape().actions())),
       event_columns_(at(loop.shape().actions())),
@@ -400,6 +399,11 @@ void Integrator::Implementation::present(Real t) {
 }
 
 void Integrator::Implementation::advance(Real t_end) {
+  // A run that stands still ends here: at this pace, what remains would take billions of steps.
+  constexpr int patience = 20'000;
+  const Real least_progress = 1e-5 * (t_end - time_);
+  Real mark = internal_time_;
+  int steps = 0;
   while (true) {
     if (event_pending_ && event_time_ <= t_end) {
       handle_event();
@@ -407,6 +411,14 @@ void Integrator::Implementation::advance(Real t_end) {
       break;
     } else {
       take_step();
+      if (++steps < patience) continue;
+      if (!(internal_time_ - mark >= least_progress)) {
+        throw IntegrationError("the integration stopped at t = " + in_seconds(internal_time_) + ": " +
+                               std::to_string(patience) + " steps advanced it by " + in_seconds(internal_time_ - mark) +
+                               ", which is no progress towards " + in_seconds(t_end));
+      }
+      mark = internal_time_;
+      steps = 0;
     }
   }
   present(t_end);
@@ -478,6 +490,11 @@ Integrator::Integrator(const ClosedLoop& loop, const ExternalDisturbance& input,
                        std::unique_ptr<NewtonSolver> newton_solver)
     : implementation_(std::make_unique<Implementation>(loop, input, std::move(newton_solver))) {}
 Integrator::~Integrator() = default;
+
+// about half a second of repetition; a restart costs some 25 steps, so large games pay a few percent for it
+std::int64_t Integrator::most_steps_between_restarts(int states) {
+  return std::max<std::int64_t>(500, 20'000'000 / states);
+}
 
 void Integrator::start(Real t, Tolerances tolerances) { implementation_->start(t, tolerances); }
 void Integrator::restart(bool parameters_changed) { implementation_->restart(parameters_changed); }

@@ -70,6 +70,8 @@ class Integrator {
   /// Largest excess of w'w over W_max that projection removed since the start, relative to W_max.
   [[nodiscard]] Real largest_raw_excess() const;
 
+  /// What bounds the steps that a restore has to repeat.
+  [[nodiscard]] static std::int64_t most_steps_between_restarts(int states);
   [[nodiscard]] Checkpoint checkpoint() const;
   /// Returns to a checkpoint by restarting at its restart point and repeating its steps. True when that led to the
   /// checkpoint's own state, bit for bit; otherwise (another machine's arithmetic) the run goes on from that state with

@@ -435,7 +435,8 @@ SnapshotShape Instance::snapshot_shape() const {
   return {.interface = interface_,
           .settings = model_.variables.saved_size(),
           .states = initial_state_.size(),
-          .modes = initial_modes_.size()};
+          .modes = initial_modes_.size(),
+          .steps = Integrator::most_steps_between_restarts(static_cast<int>(initial_state_.size()))};
 }
 
 bool Instance::restore(const Snapshot& snapshot) {

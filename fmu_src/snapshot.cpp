@@ -199,6 +199,7 @@ Checkpoint read_checkpoint(Reader& reader, const SnapshotShape& shape) {
   read_modes(reader, shape.modes, checkpoint.restart_modes);
   read_statistics(reader, checkpoint.restart_statistics);
   checkpoint.steps_since_restart = read_count(reader);
+  if (checkpoint.steps_since_restart > shape.steps) Reader::refuse("it counts too many steps");
   checkpoint.time = reader.real();
   reader.numbers(shape.states, checkpoint.state);
   read_modes(reader, shape.modes, checkpoint.modes);

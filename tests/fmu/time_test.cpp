@@ -104,6 +104,17 @@ TEST(Behaviour14StepSizes, OneLongStepAgreesWithMany) {
   EXPECT_LE(largest_difference(one, many), 1e-12);
 }
 
+TEST(Behaviour14StepSizes, AStepWithoutEndFailsInsteadOfRunningForEver) {
+  Slave slave;
+  slave.initialize();
+  slave.run(0.0, 0.5, 2);
+  const auto before = slave.get("x[1,1]");
+  EXPECT_EQ(slave.step(0.5, 1e15), fmi2Error);
+  EXPECT_NE(slave.last_message().find("no progress towards 1e+15 s"), std::string::npos) << slave.last_message();
+  EXPECT_EQ(slave.get("time"), 0.5);
+  EXPECT_EQ(slave.get("x[1,1]"), before);
+}
+
 TEST(Behaviour15WrongSteps, AreRefusedAndLeaveTheStateAlone) {
   Slave slave;
   slave.initialize();
