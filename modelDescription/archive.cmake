@@ -6,6 +6,7 @@ set(game ${PROJECT_SOURCE_DIR}/modelDescription/games/five_vehicles.toml)
 set(documentation ${PROJECT_SOURCE_DIR}/modelDescription/documentation)
 set(icon ${PROJECT_SOURCE_DIR}/modelDescription/model.png)
 set(description ${PROJECT_BINARY_DIR}/fmu/modelDescription.xml)
+set(extra ${PROJECT_BINARY_DIR}/fmu/extra)
 set(archive ${PROJECT_BINARY_DIR}/fmu/MixedOrderGame.fmu)
 
 # Name of this platform, and the folders in which importers look for its library: FMI 2.0 names none for Arm.
@@ -47,14 +48,15 @@ collect_license(libstdc++ /usr/share/doc/libstdc++-${gcc_version}-dev/copyright
 file(GLOB_RECURSE packed CONFIGURE_DEPENDS ${documentation}/* ${licenses}/*)
 add_custom_command(
   OUTPUT ${description}
-  COMMAND ${CMAKE_COMMAND} -E make_directory ${PROJECT_BINARY_DIR}/fmu
-  COMMAND mixed-order-game-description ${game} --output ${description}
+  COMMAND ${CMAKE_COMMAND} -E make_directory ${extra}
+  COMMAND mixed-order-game-description ${game} --output ${description} --extra ${extra}
   DEPENDS mixed-order-game-description ${game}
   VERBATIM)
 add_custom_command(
   OUTPUT ${archive}
   COMMAND ${Python_EXECUTABLE} ${packaging} --model-description ${description} --game ${game}
-          ${binaries} --documentation ${documentation} --licenses ${licenses} --icon ${icon} --output ${archive}
+          ${binaries} --documentation ${documentation} --licenses ${licenses} --icon ${icon} --extra ${extra}
+          --output ${archive}
   DEPENDS MixedOrderGame ${description} ${game} ${packaging} ${packed} ${icon}
   VERBATIM)
 add_custom_target(fmu ALL DEPENDS ${archive})

@@ -1,4 +1,4 @@
-// mixed-order-game-description: makes modelDescription.xml for a game, or checks a game.
+// mixed-order-game-description: makes modelDescription.xml and reference results for a game, or checks a game.
 #include <getopt.h>
 #include <unistd.h>
 
@@ -10,6 +10,7 @@
 
 #include "errors.hpp"
 #include "model_description.hpp"
+#include "reference_results.hpp"
 #include "resource_location.hpp"
 
 using namespace mixed_order_game;
@@ -17,13 +18,14 @@ using namespace mixed_order_game;
 namespace {
 
 constexpr const char* usage =
-    "usage: mixed-order-game-description [--output FILE | --check] GAME.toml\n"
+    "usage: mixed-order-game-description [[--output FILE] [--extra FOLDER] | --check] GAME.toml\n"
     "\n"
     "Writes modelDescription.xml of a game to standard output.\n"
     "\n"
-    "  -o, --output FILE  write to FILE, which is replaced only when all went well\n"
-    "  -c, --check        only check the game\n"
-    "  -h, --help         show this text\n"
+    "  -o, --output FILE   write to FILE, which is replaced only when all went well\n"
+    "  -e, --extra FOLDER  write reference results below FOLDER, unless the run is long or fails\n"
+    "  -c, --check         only check the game\n"
+    "  -h, --help          show this text\n"
     "\n"
     "Exit code: 0 fine, 1 the game is not valid or a file cannot be read or written, 2 wrong usage.\n";
 
@@ -47,19 +49,32 @@ void write_whole(const std::string& path, const std::string& text) {
   throw Error("cannot write " + path);
 }
 
+void write_reference_results(const Model& model, const std::string& extra) {
+  const std::filesystem::path folder = std::filesystem::path(extra) / reference_folder;
+  for (const auto& [name, content] : reference_results(model)) {
+    std::filesystem::create_directories(folder);
+    write_whole((folder / name).string(), content);
+  }
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
   const option options[] = {{"output", required_argument, nullptr, 'o'},
+                            {"extra", required_argument, nullptr, 'e'},
                             {"check", no_argument, nullptr, 'c'},
                             {"help", no_argument, nullptr, 'h'},
                             {}};
   std::string output;
+  std::string extra;
   bool check_only = false;
-  for (int option = 0; (option = getopt_long(argc, argv, "o:ch", options, nullptr)) != -1;) {
+  for (int option = 0; (option = getopt_long(argc, argv, "o:e:ch", options, nullptr)) != -1;) {
     switch (option) {
       case 'o':
         output = optarg;
+        break;
+      case 'e':
+        extra = optarg;
         break;
       case 'c':
         check_only = true;
@@ -72,7 +87,7 @@ int main(int argc, char** argv) {
         return wrong_usage;
     }
   }
-  if (optind + 1 != argc || (check_only && !output.empty())) {
+  if (optind + 1 != argc || (check_only && !(output.empty() && extra.empty()))) {
     std::cerr << usage;
     return wrong_usage;
   }
@@ -94,6 +109,7 @@ int main(int argc, char** argv) {
       std::cout << xml << std::flush;
       if (!std::cout) throw Error("cannot write to standard output");
     }
+    if (!extra.empty()) write_reference_results(model, extra);
     return fine;
   } catch (const GameError& error) {
     std::cerr << game << ": " << error.what() << '\n';

@@ -176,7 +176,8 @@ class Build:
         for platform, library in binaries.items():
             command += ["--binary", f"{platform}={library}"]
         command += ["--documentation", ROOT / "modelDescription" / "documentation", "--licenses", licenses]
-        command += ["--icon", ROOT / "modelDescription" / "model.png", "--output", archive]
+        command += ["--icon", ROOT / "modelDescription" / "model.png"]
+        command += ["--extra", self.description.parent / "extra", "--output", archive]
         subprocess.run(command, check=True)
         return archive
 

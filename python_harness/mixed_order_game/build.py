@@ -36,8 +36,9 @@ def build_fmu(game: Path | str, output: Path | str, *, arm_linux: bool | None = 
         raise GameError(f"there is no game file {game}")
     native = native_directory()
     with tempfile.TemporaryDirectory(prefix="mixed-order-game-") as folder:
-        description = Path(folder) / "modelDescription.xml"
-        _describe(game, description)
+        description, extra = Path(folder) / "modelDescription.xml", Path(folder) / "extra"
+        extra.mkdir()
+        _describe(game, description, extra)
         try:
             return write_fmu(
                 output,
@@ -49,6 +50,7 @@ def build_fmu(game: Path | str, output: Path | str, *, arm_linux: bool | None = 
                 documentation=native / "documentation",
                 licenses={path.name: path for path in sorted((native / "licenses").iterdir())},
                 icon=native / "model.png",
+                extra=extra,
             )
         except (PackagingError, OSError) as error:
             raise BuildError(f"cannot write {output}: {error}") from error
@@ -167,10 +169,13 @@ def _binaries(native: Path, *, arm_linux: bool) -> dict[str, Path]:
     return dict.fromkeys((ARM_LINUX, "linux64"), found[ARM_LINUX])
 
 
-def _describe(game: Path, output: Path) -> None:
-    """Run the host tool. It exits with 1 and one sentence on stderr for a bad game."""
+def _describe(game: Path, output: Path, extra: Path) -> None:
+    """Run the host tool, which writes the description and, below extra, reference results.
+
+    It exits with 1 and one sentence on stderr for a bad game.
+    """
     tool = host_tool()
-    command = [str(tool), str(game), "--output", str(output)]
+    command = [str(tool), str(game), "--output", str(output), "--extra", str(extra)]
     try:
         finished = subprocess.run(
             command, capture_output=True, encoding="utf-8", errors="replace", check=False

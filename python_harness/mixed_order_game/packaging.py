@@ -33,6 +33,7 @@ def write_fmu(
     documentation: Path | None = None,
     licenses: Mapping[str, Path] | None = None,
     icon: Path | None = None,
+    extra: Path | None = None,
 ) -> Path:
     """Write the archive of one model and return its path.
 
@@ -43,6 +44,7 @@ def write_fmu(
     documentation/...                     every file below the folder documentation
     documentation/licenses/<name>         licenses, name to file
     model.png                             icon
+    extra/...                             every file below the folder extra
 
     Entries are sorted, dated 1980-01-01 and deflated. The file appears under its name only when complete.
     Raises PackagingError if a file is missing or two claim one entry, OSError if output cannot be written.
@@ -62,8 +64,9 @@ def write_fmu(
     add("resources/game.toml", game)
     for platform, library in binaries.items():
         add(f"binaries/{_plain(platform)}/{library.name}", library)
-    for member, source in [] if documentation is None else _tree(documentation):
-        add(f"documentation/{member}", source)
+    for folder, name in ((documentation, "documentation"), (extra, "extra")):
+        for member, source in [] if folder is None else _tree(folder, name):
+            add(f"{name}/{member}", source)
     for name, source in (licenses or {}).items():
         add(f"documentation/licenses/{_plain(name)}", source)
     if icon is not None:
@@ -80,10 +83,10 @@ def _plain(name: str) -> str:
     return name
 
 
-def _tree(folder: Path) -> Iterable[tuple[str, Path]]:
+def _tree(folder: Path, name: str) -> Iterable[tuple[str, Path]]:
     """Files below a folder as (name relative to it with forward slashes, path); hidden files are left out."""
     if not folder.is_dir():
-        raise PackagingError(f"documentation: there is no folder {folder}")
+        raise PackagingError(f"{name}: there is no folder {folder}")
     for source in sorted(folder.rglob("*")):
         relative = source.relative_to(folder)
         if source.is_file() and not any(part.startswith(".") for part in relative.parts):
@@ -145,6 +148,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     )
     parser.add_argument("--licenses", type=Path, metavar="DIR", help="every file in it, by its own name")
     parser.add_argument("--icon", type=Path, metavar="PNG", help="becomes model.png")
+    parser.add_argument("--extra", type=Path, metavar="DIR", help="becomes extra/")
     parser.add_argument("--output", type=Path, required=True, metavar="FMU")
     options = parser.parse_args(arguments)
     try:
@@ -156,6 +160,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             documentation=options.documentation,
             licenses=_unique([*options.license, *_files(options.licenses)], "--license"),
             icon=options.icon,
+            extra=options.extra,
         )
     except (PackagingError, OSError) as error:
         print(f"packaging: {error}", file=sys.stderr)

@@ -1,14 +1,16 @@
-"""The archive and its binary: valid for fmpy, FMI functions and nothing else exported, only libc needed."""
+"""The archive and its binary: valid, complete and reproducible; only FMI functions exported, only libc needed."""
 
 import io
 import re
 import zipfile
 from pathlib import Path
 
+import fmpy
 import pytest
 from elftools.elf.elffile import ELFFile
 from fmpy.validation import validate_fmu
 
+from mixed_order_game import build_fmu, default_game
 from tests.conftest import GAMES, FmuOf
 
 BINARY = "binaries/linux64/MixedOrderGame.so"
@@ -59,3 +61,61 @@ def test_paths_of_the_archive(fmu: Path) -> None:
             assert "\\" not in entry.orig_filename
             assert not entry.is_dir()
             assert entry.compress_type == zipfile.ZIP_DEFLATED
+
+
+def test_reproducible_bytes(fmu: Path, tmp_path: Path) -> None:
+    again = build_fmu(default_game(), tmp_path / "again.fmu")
+    assert again.read_bytes() == fmu.read_bytes()
+
+
+def test_members(fmu: Path) -> None:
+    with zipfile.ZipFile(fmu) as archive:
+        names = archive.namelist()
+        assert archive.read("resources/game.toml") == default_game().read_bytes()
+        assert archive.read("model.png").startswith(b"\x89PNG\r\n\x1a\n")
+        page = archive.read("documentation/index.html").decode()
+    for name in ("modelDescription.xml", BINARY):
+        assert name in names
+    for word in ("Equations", "Variables", "fmi2Error", "logStatusError", "documentation/licenses", "extra/"):
+        assert word in page, word
+    assert re.findall(r'(?:src|href)="(?!#)([^"]+)"', page) == [], "nothing outside the page is needed"
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("mixed-order-game", "Redistribution and use"),
+        ("sundials", "Lawrence Livermore National Security"),
+        ("eigen", "Mozilla Public License"),
+        ("tomlplusplus", "Mark Gillard"),
+        ("libstdc++", "GCC RUNTIME LIBRARY EXCEPTION"),
+    ],
+)
+def test_licence_of_everything_linked_in(name: str, words: str, fmu: Path) -> None:
+    with zipfile.ZipFile(fmu) as archive:
+        text = archive.read(f"documentation/licenses/{name}.txt").decode(errors="replace")
+    assert words.lower() in re.sub(r"\s+", " ", text).lower()
+
+
+def test_types_units_ranges_and_categories(fmu: Path) -> None:
+    description = fmpy.read_model_description(str(fmu))
+    types = {each.name: each for each in description.typeDefinitions}
+    units = {each.name for each in description.unitDefinitions}
+    variables = description.modelVariables
+    assert {each.declaredType.name for each in variables if each.declaredType is not None} == set(types)
+    assert {each.unit for each in variables if each.unit} <= units
+    for family in ("x", "v", "u", "z", "y", "W", "k1", "d_ext"):
+        first = next(each for each in variables if each.name.partition("[")[0] == family)
+        assert first.unit or first.declaredType.unit, family
+    assert next(each for each in variables if each.name == "k1").min is not None
+    assert [category.name for category in description.logCategories] == [
+        "logStatusError",
+        "logEvents",
+        "logAll",
+    ]
+
+
+def test_default_experiment_has_at_most_a_thousand_points(fmu: Path) -> None:
+    experiment = fmpy.read_model_description(str(fmu)).defaultExperiment
+    assert float(experiment.stopTime) / float(experiment.stepSize) <= 1000.0
+    assert float(experiment.tolerance) == 1e-6
