@@ -1,0 +1,1 @@
+"""The FMU in public importers and checkers, for `./dev compliance`."""

@@ -1,0 +1,214 @@
+"""What each public importer or checker does with the FMU, and how its results compare with the oracle's.
+
+Importers run the paper's example for 20 s with communication steps of 0.02 s and tolerance_relative = 1e-8;
+their outputs are compared, every 0.1 s, with the trajectory of the independent oracle.
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+import os
+import subprocess
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from importlib.metadata import version
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mixed_order_game import read_model
+
+ROOT = Path(__file__).resolve().parents[2]
+TOOLS = ROOT / "build" / "compliance"
+HERE = Path(__file__).parent
+REFERENCE = ROOT / "tests" / "reference" / "five_vehicles.npz"
+STEP, STEPS, EVERY = 0.02, 1000, 5  # s; results every 0.1 s
+TOLERANCE = 1e-8
+BOUND = 2e-5
+"""Of a difference from the oracle, relative to the largest value of the signal, at least to 1."""
+
+FloatArray = NDArray[np.float64]
+Columns = Mapping[str, FloatArray]
+
+
+class FindingError(Exception):
+    """What a tool objected to, or where its results differ."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """One line of the table."""
+
+    tool: str
+    version: str
+    did: str
+    result: str
+    fine: bool
+
+
+@dataclass(frozen=True)
+class Tool:
+    """A tool and one thing that it does with the FMU: check returns its result or raises FindingError."""
+
+    name: str
+    version: str
+    does: str
+    check: Callable[[Path], str]
+
+    def try_on(self, fmu: Path) -> Outcome:
+        """Run it; whatever goes wrong is a finding."""
+        try:
+            return Outcome(self.name, self.version, self.does, self.check(fmu), fine=True)
+        except Exception as error:  # noqa: BLE001 - a tool that cannot even start is a finding too
+            text = " ".join(str(error).split()) or type(error).__name__
+            return Outcome(self.name, self.version, self.does, text, fine=False)
+
+
+def tools() -> list[Tool]:
+    """All of them; what is not on this machine was set up by tests/compliance/run."""
+    simulation = "imported, set a parameter, simulated 20 s"
+    return [
+        Tool("FMPy", version("fmpy"), "validated XML and structure", fmpy_validate),
+        Tool("FMPy", version("fmpy"), simulation, fmpy_simulate),
+        Tool(
+            "FMU Manipulation Toolbox",
+            pinned("fmu-manipulation-toolbox"),
+            "checked conformity and semantics",
+            toolbox,
+        ),
+        Tool("libcosim (libcosimpy)", version("libcosimpy"), simulation, libcosim),
+        Tool("Ecos (ecospy)", pinned("ecospy"), simulation, ecos),
+        Tool("FMI4j, Java", "0.38.0", simulation, fmi4j),
+        Tool("fmi-sim, Rust", "0.7.0", simulation, fmi_sim),
+    ]
+
+
+def pinned(package: str) -> str:
+    """Version in requirements.txt."""
+    lines = (HERE / "requirements.txt").read_text(encoding="utf-8").splitlines()
+    return next(line.partition("==")[2] for line in lines if line.startswith(f"{package}=="))
+
+
+def fmpy_validate(fmu: Path) -> str:
+    """`fmpy validate`, as a user calls it."""
+    output = run([ROOT / ".venv/bin/fmpy", "validate", fmu])
+    if "No problems found" not in output:
+        raise FindingError(output)
+    return "no problems found"
+
+
+def fmpy_simulate(fmu: Path) -> str:
+    """FMPy's own simulation loop."""
+    import fmpy
+
+    result = fmpy.simulate_fmu(
+        str(fmu),
+        fmi_type="CoSimulation",
+        stop_time=STEP * STEPS,
+        step_size=STEP,
+        output_interval=STEP * EVERY,
+        start_values={"tolerance_relative": TOLERANCE},
+        output=outputs(fmu),
+    )
+    return compared({name: result[name] for name in result.dtype.names})
+
+
+def toolbox(fmu: Path) -> str:
+    """The conformity and semantic checks of `fmutool`."""
+    output = run([TOOLS / ".venv/bin/fmutool", "-input", fmu, "-check"])
+    expected = ("seems to be compliant with FMI-2.0", "No semantic error")
+    if not all(sentence in output for sentence in expected) or "ERROR" in output or "WARNING" in output:
+        raise FindingError(output)
+    return "compliant, no semantic error"
+
+
+def libcosim(fmu: Path) -> str:
+    """The co-simulation library of the Open Simulation Platform."""
+    return simulated([ROOT / ".venv/bin/python", HERE / "libcosim_simulate.py"], fmu)
+
+
+def ecos(fmu: Path) -> str:
+    """The co-simulation library Ecos, in an environment of its own."""
+    return simulated([TOOLS / ".venv/bin/python", HERE / "ecos_simulate.py"], fmu)
+
+
+def fmi4j(fmu: Path) -> str:
+    """The Java library FMI4j."""
+    return simulated(["java", "-cp", f"{TOOLS}/fmi4j/*", HERE / "fmi4j" / "Simulate.java"], fmu)
+
+
+def fmi_sim(fmu: Path) -> str:
+    """The simulator of the Rust crates fmi and fmi-sim."""
+    results = TOOLS / "fmi-sim.csv"
+    options = ["--init-values", f"tolerance_relative={TOLERANCE}", "--step", STEP, "-f", STEP * STEPS]
+    interval = ["--output-interval", STEP * EVERY]
+    run([TOOLS / "bin/fmi-sim", "--model", fmu, "-o", results, "-c", ";", "cs", *options, *interval])
+    return compared(columns(results))
+
+
+def simulated(command: Sequence[object], fmu: Path) -> str:
+    """Run one of our drivers, which all take the same arguments, and compare the file that it writes."""
+    results = TOOLS / f"{Path(str(command[-1])).stem}.csv"
+    run([*command, fmu, STEPS, STEP, EVERY, results, *outputs(fmu)])
+    return compared(columns(results))
+
+
+def run(command: Sequence[object]) -> str:
+    """What a command prints. Raises FindingError if it fails."""
+    words = [str(word) for word in command]
+    environment = {**os.environ, "NO_COLOR": "1", "COLUMNS": "200"}
+    done = subprocess.run(words, capture_output=True, text=True, check=False, env=environment)
+    if done.returncode != 0:
+        raise FindingError(
+            f"{Path(words[0]).name} ended with {done.returncode}: {done.stderr or done.stdout}"
+        )
+    return done.stdout + done.stderr
+
+
+def columns(file: Path) -> Columns:
+    """A CSV file with semicolons, as names contain commas."""
+    with file.open(newline="", encoding="utf-8") as lines:
+        header, *rows = csv.reader(lines, delimiter=";")
+    return dict(zip(header, np.array(rows, dtype=np.float64).T, strict=True))
+
+
+def outputs(fmu: Path) -> list[str]:
+    """Names of the FMU's outputs."""
+    return [name for name, variable in read_model(fmu).variables.items() if variable.causality == "output"]
+
+
+def compared(results: Columns) -> str:
+    """The largest difference from the oracle. Raises FindingError if something is missing or differs."""
+    with np.load(REFERENCE) as file:
+        reference = {name: file[name] for name in ("t", "x", "v", "u", "nash_error")}
+    time = results["time"]
+    sample = np.rint(time / (STEP * EVERY)).astype(int)
+    if (
+        not np.allclose(time, reference["t"][sample], rtol=0.0, atol=1e-9)
+        or len(set(sample)) < STEPS // EVERY
+    ):
+        raise FindingError(
+            f"{len(time)} results from {time[0]:g} to {time[-1]:g} s, not one every {STEP * EVERY:g} s"
+        )
+    largest = 0.0
+    for name, values in results.items():
+        if name == "time":
+            continue
+        stem, _, index = name.partition("[")
+        expected = reference[stem]
+        scale = max(1.0, float(np.abs(expected).max()))
+        if index:
+            player, coordinate = (int(part) - 1 for part in index.rstrip("]").split(","))
+            expected = expected[:, player, coordinate]
+        largest = max(largest, float(np.abs(values - expected[sample]).max()) / scale)
+    if not largest < BOUND:
+        raise FindingError(f"differs from the oracle by {largest:.1e}")
+    return f"within {one_digit(largest)} of the oracle"
+
+
+def one_digit(value: float) -> str:
+    """Rounded up to one digit, so that the last bits of a machine do not show."""
+    exponent = math.floor(math.log10(value)) if value > 0.0 else 0
+    return f"{math.ceil(value / 10.0**exponent)}e{exponent}" if value > 0.0 else "0"
