@@ -3,8 +3,10 @@
 
 #include <cfenv>
 #include <clocale>
+#include <cstdint>
 #include <cstdio>
 #include <filesystem>
+#include <memory>
 #include <set>
 #include <sstream>
 #include <thread>
@@ -144,21 +146,49 @@ TEST(Behaviour21Instances, InterleavedOnesAreIndependent) {
   EXPECT_TRUE(same_values(b, b.all(), expected_b));
 }
 
-TEST(Behaviour21Instances, InThreadsAreIndependent) {
-  Slave alone;
-  const auto expected = course(alone);
-  constexpr int count = 4;
-  std::vector<std::vector<double>> seen(count);
-  resources_of(small_game());  // made before the threads, which only read it
-  std::vector<std::thread> threads;
-  for (int k = 0; k < count; ++k) {
-    threads.emplace_back([&, k] {
-      Slave slave;
-      seen[static_cast<std::size_t>(k)] = course(slave);
-    });
+TEST(Behaviour21Instances, SixteenThreadsWithThreeEachAreIndependent) {
+  constexpr std::size_t threads = 16;
+  constexpr int steps = 10;
+  constexpr double h = 0.0625;
+  const std::vector<std::string> games = {small_game(), five_vehicles(), vector_centers_game()};
+  // Every thread has its own gain, so that no two instances do the same; its instances take turns.
+  const auto gain = [](std::size_t thread) { return 5.0 + 0.25 * static_cast<double>(thread); };
+  const auto run_together = [&](std::size_t thread) {
+    std::vector<std::unique_ptr<Slave>> slaves;
+    for (const std::string& game : games) {
+      slaves.push_back(std::make_unique<Slave>(game));
+      EXPECT_EQ(slaves.back()->set("k3", gain(thread)), fmi2OK);
+      slaves.back()->initialize();
+    }
+    for (int k = 0; k < steps; ++k) {
+      for (const auto& slave : slaves) EXPECT_EQ(slave->step(k * h, h), fmi2OK);
+    }
+    std::vector<std::vector<double>> values;
+    for (const auto& slave : slaves) values.push_back(slave->all());
+    return values;
+  };
+  std::vector<std::vector<std::vector<double>>> expected;
+  for (std::size_t thread = 0; thread < threads; ++thread) {
+    expected.emplace_back();
+    for (const std::string& game : games) {
+      Slave alone(game);
+      ASSERT_EQ(alone.set("k3", gain(thread)), fmi2OK);
+      alone.initialize();
+      alone.run(0.0, steps * h, steps);
+      expected.back().push_back(alone.all());
+    }
   }
-  for (auto& thread : threads) thread.join();
-  for (const auto& values : seen) EXPECT_TRUE(same_values(alone, values, expected));
+  std::vector<std::vector<std::vector<double>>> seen(threads);
+  std::vector<std::thread> running;
+  for (std::size_t thread = 0; thread < threads; ++thread) {
+    running.emplace_back([&, thread] { seen[thread] = run_together(thread); });
+  }
+  for (std::thread& thread : running) thread.join();
+  for (std::size_t thread = 0; thread < threads; ++thread) {
+    for (std::size_t k = 0; k < games.size(); ++k) {
+      EXPECT_TRUE(same_values(Slave(games[k]), seen[thread][k], expected[thread][k])) << "thread " << thread;
+    }
+  }
 }
 
 TEST(Behaviour22Symbols, ExactlyTheStandardsFunctionsAreExported) {
@@ -216,42 +246,117 @@ TEST(Behaviour22Symbols, ExactlyTheStandardsFunctionsAreExported) {
   EXPECT_EQ(exported, expected);
 }
 
-TEST(Behaviour22Symbols, WorksBesideAForeignSundialsAndWithGlobalSymbols) {
-  if (MIXED_ORDER_GAME_SANITIZED) GTEST_SKIP() << "loads a second copy of what is linked in";
-  for (const char* foreign : {"libsundials_generic.so", "libsundials_nvecserial.so", "libsundials_cvode.so"}) {
-    dlopen(foreign, RTLD_NOW | RTLD_GLOBAL);  // where there is none, nothing can clash
+namespace {
+
+/// The library loaded once more, with its symbols in everybody's sight.
+struct LoadedLibrary {
+  explicit LoadedLibrary(const std::string& path) : handle(dlopen(path.c_str(), RTLD_NOW | RTLD_GLOBAL)) {
+    EXPECT_NE(handle, nullptr) << dlerror();
   }
-  void* const library = dlopen(MIXED_ORDER_GAME_LIBRARY, RTLD_NOW | RTLD_GLOBAL);
-  ASSERT_NE(library, nullptr) << dlerror();
-  const auto function = [&]<typename Function>(Function*, const char* name) {
-    return reinterpret_cast<Function*>(dlsym(library, name));
+  ~LoadedLibrary() { dlclose(handle); }
+  LoadedLibrary(const LoadedLibrary&) = delete;
+  LoadedLibrary& operator=(const LoadedLibrary&) = delete;
+
+  template <typename Function>
+  Function* function(Function*, const char* name) const {
+    return reinterpret_cast<Function*>(dlsym(handle, name));
+  }
+
+  void* handle;
+};
+
+/// An instance of the small game in a loaded library.
+struct LoadedInstance {
+  LoadedInstance(const LoadedLibrary& in, const Slave& like) : library(in) {
+    const std::string uri = "file://" + resources_of(small_game());
+    component = library.function(&fmi2Instantiate, "fmi2Instantiate")(
+        "loaded", fmi2CoSimulation, like.model().guid.c_str(), uri.c_str(), nullptr, fmi2False, fmi2False);
+    EXPECT_EQ(library.function(&fmi2EnterInitializationMode, "fmi2EnterInitializationMode")(component), fmi2OK);
+    EXPECT_EQ(library.function(&fmi2ExitInitializationMode, "fmi2ExitInitializationMode")(component), fmi2OK);
+  }
+  ~LoadedInstance() { library.function(&fmi2FreeInstance, "fmi2FreeInstance")(component); }
+  LoadedInstance(const LoadedInstance&) = delete;
+  LoadedInstance& operator=(const LoadedInstance&) = delete;
+
+  void step(double t, double h) const {
+    EXPECT_EQ(library.function(&fmi2DoStep, "fmi2DoStep")(component, t, h, fmi2True), fmi2OK);
+  }
+  void expect_values_of(Slave& slave) const {
+    for (const char* name : {"x[1,1]", "v[2,2]", "u[3,1]", "nash_error"}) {
+      const fmi2ValueReference vr = slave.reference(name);
+      double value = 0.0;
+      EXPECT_EQ(library.function(&fmi2GetReal, "fmi2GetReal")(component, &vr, 1, &value), fmi2OK);
+      EXPECT_EQ(value, slave.get(name)) << name;
+    }
+  }
+
+  const LoadedLibrary& library;
+  fmi2Component component = nullptr;
+};
+
+}  // namespace
+
+TEST(Behaviour22Symbols, WorksBesideAForeignSundials) {
+  if (MIXED_ORDER_GAME_SANITIZED) GTEST_SKIP() << "loads a second copy of what is linked in";
+  void* const vectors = dlopen("libsundials_nvecserial.so", RTLD_NOW | RTLD_GLOBAL);
+  void* const solver = dlopen("libsundials_cvode.so", RTLD_NOW | RTLD_GLOBAL);
+  if (vectors == nullptr || solver == nullptr) GTEST_SKIP() << "there is no SUNDIALS to load here";
+  // what a host does with its own SUNDIALS, by the names that the FMU's own copy has too
+  const auto foreign = [&](const char* name) {
+    void* const found = dlsym(RTLD_DEFAULT, name);
+    EXPECT_NE(found, nullptr) << name;
+    return found;
   };
-  const auto instantiate = function(&fmi2Instantiate, "fmi2Instantiate");
-  const auto enter = function(&fmi2EnterInitializationMode, "fmi2EnterInitializationMode");
-  const auto leave = function(&fmi2ExitInitializationMode, "fmi2ExitInitializationMode");
-  const auto do_step = function(&fmi2DoStep, "fmi2DoStep");
-  const auto get_real = function(&fmi2GetReal, "fmi2GetReal");
-  const auto free_instance = function(&fmi2FreeInstance, "fmi2FreeInstance");
-  ASSERT_NE(instantiate, &fmi2Instantiate) << "the loaded copy is meant";
+  const auto create_context = reinterpret_cast<int (*)(void*, void**)>(foreign("SUNContext_Create"));
+  const auto free_context = reinterpret_cast<int (*)(void**)>(foreign("SUNContext_Free"));
+  const auto new_vector = reinterpret_cast<void* (*)(std::int64_t, void*)>(foreign("N_VNew_Serial"));
+  const auto fill = reinterpret_cast<void (*)(double, void*)>(foreign("N_VConst"));
+  const auto dot = reinterpret_cast<double (*)(void*, void*)>(foreign("N_VDotProd"));
+  const auto destroy = reinterpret_cast<void (*)(void*)>(foreign("N_VDestroy"));
+  const auto create_solver = reinterpret_cast<void* (*)(int, void*)>(foreign("CVodeCreate"));
+  const auto free_solver = reinterpret_cast<void (*)(void**)>(foreign("CVodeFree"));
+  void* context = nullptr;
+  ASSERT_EQ(create_context(nullptr, &context), 0);
+  void* const vector = new_vector(3, context);
+  void* memory = create_solver(2, context);
+  ASSERT_NE(vector, nullptr);
+  ASSERT_NE(memory, nullptr);
 
   Slave linked;
   linked.initialize();
   linked.run(0.0, 2.0, 4);
-  const std::string uri = "file://" + resources_of(small_game());
-  const fmi2Component c =
-      instantiate("loaded", fmi2CoSimulation, linked.model().guid.c_str(), uri.c_str(), nullptr, fmi2False, fmi2False);
-  ASSERT_NE(c, nullptr);
-  ASSERT_EQ(enter(c), fmi2OK);
-  ASSERT_EQ(leave(c), fmi2OK);
-  for (int k = 0; k < 4; ++k) ASSERT_EQ(do_step(c, 0.5 * k, 0.5, fmi2True), fmi2OK);
-  for (const char* name : {"x[1,1]", "v[2,2]", "u[3,1]", "nash_error"}) {
-    const fmi2ValueReference vr = linked.reference(name);
-    double value = 0.0;
-    ASSERT_EQ(get_real(c, &vr, 1, &value), fmi2OK);
-    EXPECT_EQ(value, linked.get(name)) << name;
+  const LoadedLibrary library(MIXED_ORDER_GAME_LIBRARY);
+  ASSERT_NE(library.function(&fmi2Instantiate, "fmi2Instantiate"), &fmi2Instantiate) << "the loaded copy is meant";
+  const LoadedInstance instance(library, linked);
+  for (int k = 0; k < 4; ++k) {
+    instance.step(0.5 * k, 0.5);
+    fill(0.5 * k, vector);
+    EXPECT_EQ(dot(vector, vector), 3.0 * 0.25 * k * k);
   }
-  free_instance(c);
-  dlclose(library);
+  instance.expect_values_of(linked);
+  free_solver(&memory);
+  destroy(vector);
+  EXPECT_EQ(free_context(&context), 0);
+}
+
+TEST(Behaviour22Symbols, WorksTwiceUnderDifferentNames) {
+  if (MIXED_ORDER_GAME_SANITIZED) GTEST_SKIP() << "loads a second copy of what is linked in";
+  const std::string copy = resources_of("title = 'copy'", "copy") + "/AnotherName.so";
+  std::filesystem::copy_file(MIXED_ORDER_GAME_LIBRARY, copy, std::filesystem::copy_options::overwrite_existing);
+  Slave linked;
+  linked.initialize();
+  linked.run(0.0, 2.0, 4);
+  const LoadedLibrary one(MIXED_ORDER_GAME_LIBRARY);
+  const LoadedLibrary other(copy);
+  ASSERT_NE(one.function(&fmi2DoStep, "fmi2DoStep"), other.function(&fmi2DoStep, "fmi2DoStep"));
+  const LoadedInstance first(one, linked);
+  const LoadedInstance second(other, linked);
+  for (int k = 0; k < 4; ++k) {
+    first.step(0.5 * k, 0.5);
+    second.step(0.5 * k, 0.5);
+  }
+  first.expect_values_of(linked);
+  second.expect_values_of(linked);
 }
 
 TEST(Behaviour23Libraries, OnlyTheSystemsOwnAreNeeded) {
