@@ -12,8 +12,9 @@ import fmpy
 
 OK = 0
 EXPLAINED = (
-    "*yes*: as in the standard; *beyond*: allowed beyond the standard, because importers rely on it or nothing"
-    " is lost; *refused*: fmi2Error although the standard would allow it; empty: fmi2Error, as in the standard.\n"
+    "*yes*: as in the standard; *beyond*: allowed beyond the standard, because importers rely on it or"
+    " nothing is lost; *refused*: fmi2Error although the standard would allow it; empty: fmi2Error, as in"
+    " the standard.\n"
 )
 
 FRESH, INITIALIZING, RUNNING, ENDED, FAILED = (

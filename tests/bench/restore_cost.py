@@ -1,7 +1,7 @@
 """What saving and restoring a state costs: `python -m tests.bench.restore_cost [--players 5 50 200]`.
 
-For the paper's game (N = 5) and the scaling family: CPU seconds of fmi2GetFMUstate and fmi2SetFMUstate, taken at
-many times of a run, beside those of the run itself; the restored state is checked. Prints a Markdown table.
+For the paper's game (N = 5) and the scaling family: CPU time of fmi2GetFMUstate and fmi2SetFMUstate at many
+times of a run, beside that of the run itself; the restored state is checked. Prints a Markdown table.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The archive and its binary: valid, complete and reproducible; only FMI functions exported, only libc needed."""
+"""The archive and its binary: valid, complete, reproducible; exports FMI alone and needs libc alone."""
 
 import io
 import re

@@ -10,7 +10,7 @@ from tests.promises import BEHAVIOURS, CAPABILITIES, LIMITS, flags, named, page
 DOCS = Path(__file__).resolve().parents[2] / "python_harness" / "docs"
 
 REFUSED = {("fmi2GetFMUstate", "error")}
-"""Calls that the standard allows and the FMU refuses: after a failed integration there is nothing whole to save."""
+"""Allowed by the standard, refused by the FMU: after a failed integration there is nothing whole to save."""
 
 
 def test_the_page_is_current(fmu: Path) -> None:
