@@ -30,8 +30,8 @@ Besides the tests named here, `./dev fuzz` drives instances of five games with h
 AddressSanitizer, LeakSanitizer and UndefinedBehaviorSanitizer (`./dev test` does so for 30 s): serialized
 states from damaged bytes, with and without their checksum mended, and sequences of all calls of FMI in any
 order, with values such as 1e300 and NaN. No crash, leak or hang is allowed, no status but fmi2OK and
-fmi2Error, nothing that is not finite under fmi2OK; a refused call tells why and changes nothing, and fmi2Reset leads
-back to a fresh instance, bit for bit.
+fmi2Error, nothing that is not finite under fmi2OK; a refused call tells why and changes nothing, and
+fmi2Reset leads back to a fresh instance, bit for bit.
 """
 
 CAPABILITIES = {
