@@ -35,7 +35,7 @@ std::optional<std::string> simulated(const Model& model) {
     outputs.push_back(static_cast<std::uint32_t>(reference));
     table += ",\"" + variables.name(reference) + '"';
   }
-  Instance instance(model);
+  Instance instance(model, Interface::co_simulation);
   const std::int64_t states = ClosedLoop(model.game.parameters).layout().size();
   if (states > most_states) return std::nullopt;
   Experiment experiment;

@@ -29,9 +29,9 @@ HEAD = """# What the FMU promises
 Besides the tests named here, `./dev fuzz` drives instances of five games with hostile input under
 AddressSanitizer, LeakSanitizer and UndefinedBehaviorSanitizer (`./dev test` does so for 30 s): serialized
 states from damaged bytes, with and without their checksum mended, and sequences of all calls of FMI in any
-order, with values such as 1e300 and NaN. No crash, leak or hang is allowed, no status but fmi2OK and
-fmi2Error, nothing that is not finite under fmi2OK; a refused call tells why and changes nothing, and
-fmi2Reset leads back to a fresh instance, bit for bit.
+order, with values such as 1e300 and NaN. No crash, leak or hang is allowed, no status but fmi2OK,
+fmi2Error and, in model exchange, fmi2Discard, nothing that is not finite under fmi2OK; a refused call tells
+why and changes nothing, and fmi2Reset leads back to a fresh instance, bit for bit.
 """
 
 CAPABILITIES = {
@@ -45,9 +45,16 @@ CAPABILITIES = {
     "canGetAndSetFMUstate": ("Behaviour01Rollback", "Behaviour02SavingIsNeutral", "Behaviour05Handles"),
     "canSerializeFMUstate": ("Behaviour04Serialization",),
     "providesDirectionalDerivative": ("DirectionalDerivative",),
-    "completedIntegratorStepNotNeeded": ("ModelExchange",),
+    "completedIntegratorStepNotNeeded": (),
 }
 """Flags to the GoogleTest suites (all whose names begin so) that would fail if the flag were a lie."""
+
+MODEL_EXCHANGE = {
+    "canGetAndSetFMUstate": ("ModelExchangeState.", "Behaviour05Handles"),
+    "canSerializeFMUstate": ("ModelExchangeState.", "Behaviour04Serialization"),
+    "providesDirectionalDerivative": ("DirectionalDerivative", "ModelExchangeDerivatives"),
+}
+"""Those that model exchange has of its own."""
 
 LIMITS = ("needsExecutionTool", "canBeInstantiatedOnlyOncePerProcess")
 """Flags that promise something by being false."""
@@ -105,10 +112,9 @@ def suites() -> dict[str, list[str]]:
 
 
 def named(prefix: str) -> list[str]:
-    """Full names of the tests whose suites begin so."""
-    return [
-        f"{suite}.{test}" for suite, tests in suites().items() if suite.startswith(prefix) for test in tests
-    ]
+    """Full names of the tests that begin so."""
+    tests = (f"{suite}.{test}" for suite, each in suites().items() for test in each)
+    return [test for test in tests if test.startswith(prefix)]
 
 
 def flags(fmu: Path) -> dict[str, dict[str, str]]:
@@ -128,10 +134,16 @@ def capabilities(fmu: Path) -> str:
     for interface, values in flags(fmu).items():
         for flag, value in values.items():
             claimed = (value == "false") == (flag in LIMITS)
-            tests = [test for prefix in CAPABILITIES[flag] for test in named(prefix)]
+            tests = proofs(interface, flag)
             proof = _list(tests) if claimed else "not claimed"
             lines.append(f"| {interface}: `{flag}` | {value} | {proof} |")
     return "\n".join(lines) + "\n"
+
+
+def proofs(interface: str, flag: str) -> list[str]:
+    """The tests that prove a flag."""
+    own = MODEL_EXCHANGE.get(flag) if interface == "model exchange" else None
+    return [test for prefix in own or CAPABILITIES[flag] for test in named(prefix)]
 
 
 def behaviours() -> str:

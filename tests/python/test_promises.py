@@ -5,7 +5,7 @@ from pathlib import Path
 import fmpy
 
 from tests.calls_and_states import STANDARD, Library, legal
-from tests.promises import BEHAVIOURS, CAPABILITIES, LIMITS, flags, named, page
+from tests.promises import BEHAVIOURS, LIMITS, flags, named, page, proofs
 
 DOCS = Path(__file__).resolve().parents[2] / "python_harness" / "docs"
 
@@ -25,10 +25,10 @@ def test_every_behaviour_has_tests() -> None:
 
 
 def test_every_flag_that_promises_something_has_tests(fmu: Path) -> None:
-    for values in flags(fmu).values():
+    for interface, values in flags(fmu).items():
         for flag, value in values.items():
             if (value == "false") == (flag in LIMITS):
-                assert [test for prefix in CAPABILITIES[flag] for test in named(prefix)] != [], flag
+                assert proofs(interface, flag) != [], flag
 
 
 def test_only_known_calls_are_refused_that_the_standard_allows(fmu: Path, tmp_path: Path) -> None:
