@@ -110,6 +110,7 @@ def test_types_units_ranges_and_categories(fmu: Path) -> None:
     assert next(each for each in variables if each.name == "k1").min is not None
     assert [category.name for category in description.logCategories] == [
         "logStatusError",
+        "logStatusDiscard",
         "logEvents",
         "logAll",
     ]
