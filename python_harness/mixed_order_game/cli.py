@@ -20,6 +20,7 @@ from .build import fmu_of, game_file
 from .compare_command import register as register_compare
 from .errors import MixedOrderGameError
 from .reporting.command import register as register_report
+from .shared_options import ToleranceOption
 from .sweep_command import register as register_sweep
 from .tune_command import register as register_tune
 from .version import package_version
@@ -153,9 +154,7 @@ def run(
     step: Annotated[
         float | None, typer.Option(help="Time between samples in s.", show_default="FMU's")
     ] = None,
-    tolerance: Annotated[
-        float | None, typer.Option(help="Relative tolerance of the integrator.", show_default="FMU's")
-    ] = None,
+    tolerance: ToleranceOption = None,
     output: Annotated[
         Path | None, typer.Option("--output", "-o", help="Result file, .csv or .parquet.", show_default=False)
     ] = None,

@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from .shared_options import SettingsOption, SettleTimeOption, StepOption, StopTimeOption, ToleranceOption
+
 if TYPE_CHECKING:
     from .compare import Comparison
     from .model import Value
@@ -47,24 +49,14 @@ def compare(
             help="Another run of every game, with other start values; repeatable.",
         ),
     ] = None,
-    settings: Annotated[
-        list[str] | None,
-        typer.Option("--set", metavar="NAME=VALUE", help="Start value of all runs of games; repeatable."),
-    ] = None,
+    settings: SettingsOption = None,
     baselines: Annotated[  # noqa: FBT002 - the signature is the options
         bool, typer.Option("--baselines/--no-baselines", help="Run every game without its parts, too.")
     ] = True,
-    stop_time: Annotated[
-        float | None, typer.Option(help="End of the runs in s.", show_default="FMU's")
-    ] = None,
-    step: Annotated[float | None, typer.Option(help="Sampling in s.", show_default="FMU's")] = None,
-    tolerance: Annotated[
-        float | None, typer.Option(help="Relative tolerance of the integrator.", show_default="FMU's")
-    ] = None,
-    settle_time: Annotated[
-        float | None,
-        typer.Option(help="Time in s from which the final error is taken.", show_default="80 % of the run"),
-    ] = None,
+    stop_time: StopTimeOption = None,
+    step: StepOption = None,
+    tolerance: ToleranceOption = None,
+    settle_time: SettleTimeOption = None,
     band: Annotated[
         float | None,
         typer.Option(

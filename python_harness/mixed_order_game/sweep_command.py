@@ -8,6 +8,15 @@ import typer
 
 from .designs import Sampling
 from .graphs import GRAPHS_HELP
+from .shared_options import (
+    BandOption,
+    GameArgument,
+    SettingsOption,
+    SettleTimeOption,
+    StepOption,
+    StopTimeOption,
+    ToleranceOption,
+)
 
 if TYPE_CHECKING:
     from .sweeping import Sweep, SweepResult
@@ -42,13 +51,7 @@ def register(app: typer.Typer) -> None:
 
 
 def sweep(
-    game: Annotated[
-        Path | None,
-        typer.Argument(
-            help="An FMU (.fmu) or a game file (.toml); the paper's example when left out.",
-            show_default=False,
-        ),
-    ] = None,
+    game: GameArgument = None,
     output: Annotated[Path, typer.Option("--output", "-o", help="Folder for the rows.")] = Path("sweep"),
     example: Annotated[  # noqa: FBT002 - the signature is the options
         bool,
@@ -57,10 +60,7 @@ def sweep(
             help="The built-in example: every connected graph, judged on the paper's neighbourhood.",
         ),
     ] = False,
-    settings: Annotated[
-        list[str] | None,
-        typer.Option("--set", metavar="NAME=VALUE", help="Start value of all runs; repeatable."),
-    ] = None,
+    settings: SettingsOption = None,
     grid: Annotated[
         list[str] | None,
         typer.Option(
@@ -90,21 +90,11 @@ def sweep(
         typer.Option(metavar="LOW:HIGH", help="Range of random v0; the game's own when left out."),
     ] = None,
     seed: Annotated[int, typer.Option(min=0, help="Of everything that is drawn.")] = 0,
-    stop_time: Annotated[
-        float | None, typer.Option(help="End of every run in s.", show_default="FMU's")
-    ] = None,
-    step: Annotated[float | None, typer.Option(help="Sampling in s.", show_default="FMU's")] = None,
-    tolerance: Annotated[
-        float | None, typer.Option(help="Relative tolerance of the integrator.", show_default="FMU's")
-    ] = None,
-    settle_time: Annotated[
-        float | None,
-        typer.Option(help="Time in s from which the final error is taken.", show_default="80 % of the run"),
-    ] = None,
-    band: Annotated[
-        float | None,
-        typer.Option(help="Largest |x - x*| that counts as settled.", show_default="2 % of the initial one"),
-    ] = None,
+    stop_time: StopTimeOption = None,
+    step: StepOption = None,
+    tolerance: ToleranceOption = None,
+    settle_time: SettleTimeOption = None,
+    band: BandOption = None,
     neighbourhood: Annotated[
         float | None,
         typer.Option(min=0.0, help="Exit with 1 if a final error is not below.", show_default=False),

@@ -1,12 +1,12 @@
 """The command `mog tune`: parses options and prints."""
 
 import json
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from .graphs import GRAPHS_HELP
+from .shared_options import BandOption, GameArgument, SettingsOption
 
 if TYPE_CHECKING:
     from .tune import Tuned
@@ -30,13 +30,7 @@ def register(app: typer.Typer) -> None:
 
 
 def tune(
-    game: Annotated[
-        Path | None,
-        typer.Argument(
-            help="An FMU (.fmu) or a game file (.toml); the paper's example when left out.",
-            show_default=False,
-        ),
-    ] = None,
+    game: GameArgument = None,
     *,
     settling_time: Annotated[
         float,
@@ -56,14 +50,8 @@ def tune(
             "--range", metavar="NAME=LOW:HIGH", help="Where a gain is sought: LOW:HIGH; repeatable."
         ),
     ] = None,
-    settings: Annotated[
-        list[str] | None,
-        typer.Option("--set", metavar="NAME=VALUE", help="Start value of all runs; repeatable."),
-    ] = None,
-    band: Annotated[
-        float | None,
-        typer.Option(help="Largest |x - x*| that counts as settled.", show_default="2 % of the initial one"),
-    ] = None,
+    settings: SettingsOption = None,
+    band: BandOption = None,
     stop_time: Annotated[
         float | None, typer.Option(help="End of the runs in s.", show_default="4 times the wish, at least 2")
     ] = None,

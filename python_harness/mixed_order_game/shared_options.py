@@ -1,0 +1,37 @@
+"""Arguments and options that several commands have in common."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+GameArgument = Annotated[
+    Path | None,
+    typer.Argument(
+        help="An FMU (.fmu) or a game file (.toml); the paper's example when left out.",
+        show_default=False,
+    ),
+]
+
+SettingsOption = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="NAME=VALUE", help="Start value of all runs; repeatable."),
+]
+
+StopTimeOption = Annotated[float | None, typer.Option(help="End of every run in s.", show_default="FMU's")]
+
+StepOption = Annotated[float | None, typer.Option(help="Sampling in s.", show_default="FMU's")]
+
+ToleranceOption = Annotated[
+    float | None, typer.Option(help="Relative tolerance of the integrator.", show_default="FMU's")
+]
+
+SettleTimeOption = Annotated[
+    float | None,
+    typer.Option(help="Time in s from which the final error is taken.", show_default="80 % of the run"),
+]
+
+BandOption = Annotated[
+    float | None,
+    typer.Option(help="Largest |x - x*| that counts as settled.", show_default="2 % of the initial one"),
+]
