@@ -1,7 +1,8 @@
 // One instance of the model, as any version of FMI sees it: settings, the run, and what is read from it.
 //
-// Every call either succeeds or throws: Error when it was refused, and then nothing has changed; IntegrationError when
-// the integration failed, and then the instance is in the error state.
+// Every call either succeeds or throws: Error when it was refused, and then nothing has changed; NotComputable,
+// likewise, when a run by model exchange stands where the model has no finite values; IntegrationError when the
+// integration failed, and then the instance is in the error state.
 #pragma once
 
 #include <array>
@@ -32,7 +33,7 @@ class NotComputable : public Error {
 
 class Instance {
  public:
-  explicit Instance(Model model, Interface interface);
+  Instance(Model model, Interface interface);
   Instance(const Instance&) = delete;  // the integrator refers to its members
   Instance& operator=(const Instance&) = delete;
 
@@ -60,7 +61,7 @@ class Instance {
   /// Co-simulation: moves from the communication point t to t + h.
   void do_step(Real t, Real h);
 
-  // Model exchange; NotComputable is thrown where rates or event indicators are not finite.
+  // Model exchange
   void enter_event_mode() { phase_ = Phase::event_mode; }
   /// True when the state moved.
   bool new_discrete_states();
