@@ -12,7 +12,7 @@ import pytest
 
 from mixed_order_game import build_fmu
 from tests.bench.scaling_game import scaling_game
-from tests.conftest import FmuOf
+from tests.conftest import GAMES, FmuOf
 from tests.oracle.make_reference import CASES, REFERENCE
 
 FOLDER = "extra/org.fmi-standard.fmi-ls-ref"
@@ -95,6 +95,18 @@ def test_a_large_game_goes_without(tmp_path: Path) -> None:
     game = tmp_path / "fifty.toml"
     game.write_text(scaling_game(50), encoding="utf-8")
     with zipfile.ZipFile(build_fmu(game, tmp_path / "fifty.fmu")) as archive:
+        assert not [name for name in archive.namelist() if name.startswith("extra/")]
+
+
+def test_a_game_that_cannot_run_to_the_end_goes_without(tmp_path: Path) -> None:
+    text = (GAMES / "two_scalar_players.toml").read_text(encoding="utf-8")
+    explosive = text.replace("square = [[1, -0.10]]", "square = [[1, 1e6]]").replace(
+        "x0 = -1.62", "x0 = 1.62"
+    )
+    assert explosive.count("1e6") == 1
+    game = tmp_path / "explosive.toml"
+    game.write_text(explosive, encoding="utf-8")
+    with zipfile.ZipFile(build_fmu(game, tmp_path / "explosive.fmu")) as archive:
         assert not [name for name in archive.namelist() if name.startswith("extra/")]
 
 
