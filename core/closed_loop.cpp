@@ -20,17 +20,14 @@ void ClosedLoop::initial_state(const InitialState& initial, Real* state) const {
   std::fill(state + layout_.weights(), state + layout_.size(), 0.0);
 }
 
-void ClosedLoop::evaluate_seeking(const Real* state, Signals& signals) const {
-  const Kernels& kernel = kernels();
+void ClosedLoop::evaluate_errors(const Real* state, Signals& signals) const {
   const auto& [shape, gains, strategy, rbf, graph, cost, dynamics, disturbance, initial] = parameters_;
-  const int n = shape.actions();
   const Real* x = state + layout_.x();
   const Real* reference = state + layout_.reference();  // z or v
-  const Real* y = state + layout_.estimates();
   Real* e = signals.error.data();
   const Real* gradient = signals.gradient.data();
 
-  cost->own_gradients(y, n, signals.gradient.data());
+  cost->own_gradients(state + layout_.estimates(), shape.actions(), signals.gradient.data());
   for (int l = 0; l < shape.dimension; ++l) {
     for (int i = 0; i < shape.players; ++i) {
       const int p = l * shape.players + i;
@@ -43,18 +40,32 @@ void ClosedLoop::evaluate_seeking(const Real* state, Signals& signals) const {
       }
     }
   }
+}
+
+void ClosedLoop::evaluate_robust_term(Signals& signals) const {
+  // phi_i = delta tanh(K delta e_i / epsilon)
+  const Gains& gains = parameters_.gains;
+  kernels().scaled_tanh(shape().actions(), gains.delta, robust_term_constant * gains.delta / gains.epsilon,
+                        signals.error.data(), signals.robust.data());
+}
+
+void ClosedLoop::evaluate_seeking(const Real* state, Signals& signals) const {
+  const Kernels& kernel = kernels();
+  const auto& [shape, gains, strategy, rbf, graph, cost, dynamics, disturbance, initial] = parameters_;
+  const int n = shape.actions();
+
+  evaluate_errors(state, signals);
   if (!strategy.robust) {  // the estimation module is absent
     std::fill_n(signals.network.begin(), n, 0.0);
     std::fill_n(signals.robust.begin(), n, 0.0);
     return;
   }
   const auto activations = rbf.diagonal ? kernel.activations_diagonal : kernel.activations_general;
-  activations(shape.players, shape.dimension, shape.neurons, rbf.centers.data(), rbf.width, y, signals.exponent.data(),
-              signals.activation.data());
+  activations(shape.players, shape.dimension, shape.neurons, rbf.centers.data(), rbf.width, state + layout_.estimates(),
+              signals.exponent.data(), signals.activation.data());
   kernel.column_products(n, shape.neurons, state + layout_.weights(), signals.activation.data(),
                          signals.network.data());
-  // phi_i = delta tanh(K delta e_i / epsilon)
-  kernel.scaled_tanh(n, gains.delta, robust_term_constant * gains.delta / gains.epsilon, e, signals.robust.data());
+  evaluate_robust_term(signals);
 }
 
 void ClosedLoop::evaluate(Real t, const Real* state, const Real* d_ext, const Modes& modes, Signals& signals,

@@ -29,6 +29,12 @@ class ClosedLoop {
   /// The same from other values, such as those of a direction.
   void initial_state(const InitialState& initial, Real* state) const;
 
+  /// The first of the signals: xbar, gradient and error.
+  void evaluate_errors(const Real* state, Signals& signals) const;
+
+  /// phi of the signals' errors.
+  void evaluate_robust_term(Signals& signals) const;
+
   /// The part of the signals that every player computes from its own state and estimates: xbar, gradient, error,
   /// activations, network and robust term.
   void evaluate_seeking(const Real* state, Signals& signals) const;

@@ -65,6 +65,7 @@ class Integrator::Implementation final : NewtonSystem {
   int event_functions(const Real* state, Real* values) noexcept;
   int newton_matrix(const Real* state, Real gamma) noexcept;
   int solve(Real* b) noexcept override;
+  Real linearization_defect(const Real* state, Real gamma, const Real* weight) noexcept override;
 
   template <typename Action>
   int guarded(Action action) noexcept {
@@ -105,6 +106,7 @@ class Integrator::Implementation final : NewtonSystem {
 
   // scratch
   Signals signals_;
+  Signals trial_;
   AlignedVector d_ext_;
   AlignedVector norm2_;
   AlignedVector rate_;
@@ -137,6 +139,7 @@ Integrator::Implementation::Implementation(const ClosedLoop& loop, const Externa
       state_(at(size_)),
       modes_(at(loop.shape().actions())),
       signals_(loop.shape()),
+      trial_(loop.shape()),
       d_ext_(at(loop.shape().actions())),
       norm2_(at(loop.shape().actions())),
       rate_(at(size_)),
@@ -239,6 +242,24 @@ int Integrator::Implementation::newton_matrix(const Real* state, Real gamma) noe
     ++newton_setups_;
     return newton_->factor(jacobian_, gamma) ? 0 : 1;
   });
+}
+
+/// That of the robust term, which bends within |e| < epsilon / (K delta): a step may lead from one side of this layer
+/// to the other. All else is nearly linear within a step.
+Real Integrator::Implementation::linearization_defect(const Real* state, Real gamma, const Real* weight) noexcept {
+  if (!loop_.parameters().strategy.robust) return 0.0;
+  loop_.evaluate_errors(state, trial_);
+  loop_.evaluate_robust_term(trial_);
+  const StateLayout& layout = loop_.layout();
+  Real sum = 0.0;
+  for (std::size_t p = 0; p < modes_.size(); ++p) {
+    const Real foretold = signals_.robust[p] + jacobian_.slope[p] * (trial_.error[p] - signals_.error[p]);
+    const bool second = loop_.shape().is_second_order(loop_.shape().player_of(static_cast<int>(p)));
+    const Real defect =
+        gamma * (trial_.robust[p] - foretold) * weight[at(second ? layout.reference() : layout.x()) + p];
+    sum += defect * defect;
+  }
+  return std::sqrt(sum);
 }
 
 int Integrator::Implementation::solve(Real* b) noexcept {

@@ -117,11 +117,14 @@ int NewtonIteration::iterate(Real* correction, const Real* weight, Real toleranc
     const Real squares = kernel.add_correction(n, scale, delta_.data(), weight, correction);
     const Real size = std::sqrt(squares / static_cast<Real>(n));
     if (number > 0) convergence_rate_ = std::max(0.3 * convergence_rate_, size / last_size);
-    if (size * std::min(1.0, convergence_rate_) <= tolerance) return 0;
+    const bool converged = size * std::min(1.0, convergence_rate_) <= tolerance;
+    if (converged && size <= tolerance) return 0;
+    kernel.linear_sum(n, 1.0, NV_DATA_S(predicted), 1.0, correction, y);
+    // an expected rate is a guess: it fails where the linearization does
+    if (converged && system_.linearization_defect(y, gamma, weight) <= tolerance) return 0;
     const bool diverges = number > 0 && size > 2.0 * last_size;
     if (diverges || number + 1 == most_iterations_ || !std::isfinite(size)) return SUN_NLS_CONV_RECVR;
     last_size = size;
-    kernel.linear_sum(n, 1.0, NV_DATA_S(predicted), 1.0, correction, y);
     if (const int result = system_.rate(t, y, f); result != 0) return rate_failure(result);
   }
 }

@@ -20,6 +20,9 @@ class NewtonSystem {
   virtual int rate(Real t, const Real* state, Real* rate) noexcept = 0;  ///< need not be finite
   /// Replaces b by (I - gamma J)^-1 b with gamma and J of the last factorization.
   virtual int solve(Real* b) noexcept = 0;
+  /// By how much the rates at this state, times gamma, differ from those that the factorized matrix foretells from the
+  /// state of the last evaluation: 2-norm of the weighted differences.
+  virtual Real linearization_defect(const Real* state, Real gamma, const Real* weight) noexcept = 0;
 
  protected:
   ~NewtonSystem() = default;

@@ -222,6 +222,29 @@ TEST(Integrator, DoesNotChatterOnGrazingColumns) {
   }
 }
 
+// With gains that the theorems ask for, the layer of the robust term is 4e-9 wide and relaxes within 1e-15 s.
+TEST(Integrator, FollowsARobustTermAsSteepAsTheTheoremsAskFor) {
+  Game game = parse_game(text_of(paper_game));
+  Gains& gains = game.parameters.gains;
+  gains.k1 = 9.7e4;
+  gains.k2 = 54.0;
+  gains.k3 = 3.4e6;
+  gains.k4 = 3.3e14;
+  gains.beta = 2e6;
+  gains.delta = 3.3e6;
+  gains.epsilon = 0.004;
+  const ClosedLoop loop(game.parameters);
+  const std::vector<Real> x_star = nash_equilibrium(*loop.parameters().cost, loop.shape());
+  const ExternalDisturbance input(loop.shape().actions());
+  for (const Real tolerance : {1e-8, 1e-9, 1e-10, 1e-11}) {
+    Integrator integrator(loop, input, make_newton_solver(loop.shape()));
+    integrator.start(0.0, {tolerance, 0.01 * tolerance});
+    for (int k = 1; k <= 500; ++k) integrator.advance(0.001 * k);
+    EXPECT_LT(integrator.statistics().steps, 10'000) << tolerance;
+    for (std::size_t p = 0; p < x_star.size(); ++p) EXPECT_NEAR(integrator.state()[p], x_star[p], 1e-6) << tolerance;
+  }
+}
+
 TEST(Integrator, AnInputActsFromTheRestartOn) {
   Simulation run(text_of(paper_game));
   run.integrator.start(0.0, {1e-7, 1e-9});

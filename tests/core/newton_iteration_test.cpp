@@ -82,6 +82,9 @@ class Stepper final : public NewtonSystem {
     Eigen::Map<Vector>(rate, size_) = rates_(Eigen::Map<const Vector>(state, size_));
     return 0;
   }
+  Real linearization_defect(const Real* /*state*/, Real /*gamma*/, const Real* /*weight*/) noexcept override {
+    return 0.0;
+  }
   void factor(const Real* state, Real gamma) {
     factors_.compute(Matrix::Identity(size_, size_) - gamma * jacobian_(Eigen::Map<const Vector>(state, size_)));
   }
