@@ -47,6 +47,6 @@ def slow(source: Source, settings: Settings, cases: Sequence[Case]) -> list[Outc
     """run_chunk, slowly enough to be interrupted."""
     outcomes = []
     for case in cases:
-        time.sleep(0.02)
+        time.sleep(0.06)
         outcomes += noted(source, settings, [case])
     return outcomes
