@@ -14,8 +14,8 @@
 
 #include "errors.hpp"
 #include "kernels/kernels.hpp"
-#include "newton_iteration.hpp"
 #include "sundials_handles.hpp"
+#include "sundials_newton_iteration.hpp"
 
 namespace mixed_order_game {
 

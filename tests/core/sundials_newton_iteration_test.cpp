@@ -1,4 +1,4 @@
-#include "newton_iteration.hpp"
+#include "sundials_newton_iteration.hpp"
 
 #include <cvode/cvode.h>
 #include <gtest/gtest.h>
