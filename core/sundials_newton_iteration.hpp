@@ -1,8 +1,8 @@
 // The Newton iteration of an implicit step of CVODE, attached to it as a SUNNonlinearSolver.
 //
 // A step solves  r(c) = c + rl1 zn1 - gamma f(t, ypred + c) = 0  for the correction c. It does what the library's own
-// iteration does, with each pass over the vectors done once and without copies. It expects a good rate of convergence of
-// a new factorization, and checks the linearization before it ends on such a rate.
+// iteration does, with each pass over the vectors done once and without copies. It expects a good rate of convergence
+// of a new factorization, and checks the linearization before it ends on such a rate.
 #pragma once
 
 #include <sundials/sundials_nonlinearsolver.h>
