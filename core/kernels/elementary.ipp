@@ -24,16 +24,21 @@ inline void store(const Vector& vector, double* to) { __builtin_memcpy(to, &vect
 inline VectorBits bits_of(const Vector& vector) { return reinterpret_cast<VectorBits>(vector); }
 inline Vector vector_of(const VectorBits& bits) { return reinterpret_cast<Vector>(bits); }
 
-/// Applies function(vector) -> vector to n numbers.
+/// out = function(vectors of a) for n numbers; out may be a.
 template <typename Function>
 inline void for_each_vector(int n, const double* a, double* out, Function function) {
-  int k = 0;
-  for (; k + vector_length <= n; k += vector_length) store(function(load(a + k)), out + k);
-  if (k == n) return;
-  double rest[vector_length] = {};
-  for (int r = 0; k + r < n; ++r) rest[r] = a[k + r];
-  store(function(load(rest)), rest);
-  for (int r = 0; k + r < n; ++r) out[k + r] = rest[r];
+  if (n >= vector_length) {
+    const Vector last = function(load(a + n - vector_length));  // overlaps the one before: taken first, put last
+    for (int k = 0; k + vector_length < n; k += vector_length) store(function(load(a + k)), out + k);
+    store(last, out + n - vector_length);
+    return;
+  }
+  double few[vector_length];
+  for (int k = 0; k < vector_length; ++k) few[k] = k < n ? a[k] : 0.0;
+  store(function(load(few)), few);
+  for (int k = 0; k < vector_length; ++k) {
+    if (k < n) out[k] = few[k];
+  }
 }
 
 // a = k ln 2 + r with |r| <= ln 2 / 2; returns exp(r) - 1 and 2^k.
@@ -45,19 +50,18 @@ inline void reduce_exponential(const Vector& a, Vector* expm1_of_rest, Vector* p
   const Vector shifted = a * log2_e + round_and_bias;
   const Vector k = shifted - round_and_bias;
   const Vector r = (a - k * ln2_high) - k * ln2_low;
-  // Taylor polynomial of degree 13: its remainder on |r| <= 0.3466 is below 5e-18
-  Vector p = r * (1.0 / 6227020800.0) + 1.0 / 479001600.0;
-  p = p * r + 1.0 / 39916800.0;
-  p = p * r + 1.0 / 3628800.0;
-  p = p * r + 1.0 / 362880.0;
-  p = p * r + 1.0 / 40320.0;
-  p = p * r + 1.0 / 5040.0;
-  p = p * r + 1.0 / 720.0;
-  p = p * r + 1.0 / 120.0;
-  p = p * r + 1.0 / 24.0;
-  p = p * r + 1.0 / 6.0;
-  p = p * r + 0.5;
-  *expm1_of_rest = r + (r * r) * p;
+  // Taylor polynomial of degree 13: its remainder on |r| <= 0.3466 is below 5e-18. Summed in pairs, pairs of pairs and
+  // so on, because a chain of operations that wait for each other takes longest.
+  const Vector r2 = r * r;
+  const Vector r4 = r2 * r2;
+  const Vector p2 = r * (1.0 / 6.0) + 0.5;
+  const Vector p4 = r * (1.0 / 120.0) + 1.0 / 24.0;
+  const Vector p6 = r * (1.0 / 5040.0) + 1.0 / 720.0;
+  const Vector p8 = r * (1.0 / 362880.0) + 1.0 / 40320.0;
+  const Vector p10 = r * (1.0 / 39916800.0) + 1.0 / 3628800.0;
+  const Vector p12 = r * (1.0 / 6227020800.0) + 1.0 / 479001600.0;
+  const Vector p = ((p4 * r2 + p2) + (p8 * r2 + p6) * r4) + (p12 * r2 + p10) * (r4 * r4);
+  *expm1_of_rest = r + r2 * p;
   *power = vector_of(bits_of(shifted) << 52);
 }
 
@@ -109,18 +113,14 @@ inline Vector sin_of(const Vector& a) {
   const VectorBits quadrant = bits_of(shifted);
   const Vector r = (((a - k * half_pi_1) - k * half_pi_2) - k * half_pi_3) - k * half_pi_4;
   const Vector z = r * r;
-  Vector s = z * 1.58969099521155010221e-10 - 2.50507602534068634195e-08;
-  s = s * z + 2.75573137070700676789e-06;
-  s = s * z - 1.98412698298579493134e-04;
-  s = s * z + 8.33333333332248946124e-03;
-  s = s * z - 1.66666666666666324348e-01;
-  const Vector sine = r + (z * r) * s;
-  Vector c = z * -1.13596475577881948265e-11 + 2.08757232129817482790e-09;
-  c = c * z - 2.75573143513906633035e-07;
-  c = c * z + 2.48015872894767294178e-05;
-  c = c * z - 1.38888888888741095749e-03;
-  c = c * z + 4.16666666666666019037e-02;
-  const Vector cosine = 1.0 - (0.5 * z - (z * z) * c);
+  const Vector w = z * z;
+  const Vector s2 = z * -1.98412698298579493134e-04 + 8.33333333332248946124e-03;
+  const Vector s4 = z * -2.50507602534068634195e-08 + 2.75573137070700676789e-06;
+  const Vector sine = r + (z * r) * (z * (w * (w * 1.58969099521155010221e-10 + s4) + s2) - 1.66666666666666324348e-01);
+  const Vector c1 = z * -1.38888888888741095749e-03 + 4.16666666666666019037e-02;
+  const Vector c3 = z * -2.75573143513906633035e-07 + 2.48015872894767294178e-05;
+  const Vector c5 = z * -1.13596475577881948265e-11 + 2.08757232129817482790e-09;
+  const Vector cosine = 1.0 - (0.5 * z - w * (w * (w * c5 + c3) + c1));
   const VectorBits odd = (quadrant & 1) != 0;
   const Vector value = odd ? cosine : sine;
   const VectorBits negative = (quadrant & 2) << 62;
