@@ -14,6 +14,22 @@ namespace mixed_order_game {
 
 namespace {
 
+// Data begin on a cache line; the library's own vectors begin anywhere.
+constexpr std::align_val_t cache_line{64};
+void destroy_vector(N_Vector vector) {
+  ::operator delete(NV_DATA_S(vector), cache_line);
+  N_VDestroy_Serial(vector);  // which does not own the data
+}
+N_Vector clone_vector(N_Vector vector) {
+  const auto bytes = static_cast<std::size_t>(NV_LENGTH_S(vector)) * sizeof(SunReal);
+  N_Vector clone = N_VCloneEmpty_Serial(vector);
+  if (clone == nullptr) return nullptr;
+  NV_DATA_S(clone) = static_cast<SunReal*>(::operator new(bytes, cache_line, std::nothrow));
+  if (NV_DATA_S(clone) != nullptr) return clone;
+  N_VDestroy_Serial(clone);
+  return nullptr;
+}
+
 // CVODE spends its time in a handful of vector operations: these replace the library's by the kernels.
 
 void vector_linear_sum(SunReal a, N_Vector x, SunReal b, N_Vector y, N_Vector z) {
@@ -67,8 +83,12 @@ ContextHandle make_context() {
 }
 
 VectorHandle make_vector(int size, SUNContext context) {
-  N_Vector vector = N_VNew_Serial(size, context);
+  const VectorHandle pattern(N_VNewEmpty_Serial(size, context));
+  if (pattern == nullptr) throw std::bad_alloc();
+  N_Vector vector = clone_vector(pattern.get());
   if (vector == nullptr) throw std::bad_alloc();
+  vector->ops->nvclone = clone_vector;
+  vector->ops->nvdestroy = destroy_vector;
   vector->ops->nvlinearsum = vector_linear_sum;
   vector->ops->nvscale = vector_scale;
   vector->ops->nvconst = vector_fill;
