@@ -35,6 +35,13 @@ class ClosedLoop {
   /// phi of the signals' errors.
   void evaluate_robust_term(Signals& signals) const;
 
+  /// d phi / d e = K delta^2 / epsilon (1 - (phi / delta)^2), from phi.
+  [[nodiscard]] Real robust_term_slope(Real phi) const {
+    const Gains& gains = parameters_.gains;
+    const Real tanh = gains.delta != 0.0 ? phi / gains.delta : 0.0;
+    return robust_term_constant * gains.delta * gains.delta / gains.epsilon * ((1.0 - tanh) * (1.0 + tanh));
+  }
+
   /// The part of the signals that every player computes from its own state and estimates: xbar, gradient, error,
   /// activations, network and robust term.
   void evaluate_seeking(const Real* state, Signals& signals) const;

@@ -45,12 +45,8 @@ void LoopJacobian::linearize(const Real* state, const Signals& signals, const Mo
   }
   std::copy_n(state + layout.weights(), weights.size(), weights.begin());
   std::copy(signals.activation.begin(), signals.activation.end(), activation.begin());
-  const Gains& gains = parameters.gains;
-  const Real steepest = robust_term_constant * gains.delta * gains.delta / gains.epsilon;
   for (std::size_t p = 0; p < slope.size(); ++p) {
-    // d phi / d e = K delta^2 / epsilon (1 - tanh^2)
-    const Real tanh = gains.delta != 0.0 ? signals.robust[p] / gains.delta : 0.0;
-    slope[p] = steepest * ((1.0 - tanh) * (1.0 + tanh));
+    slope[p] = loop_->robust_term_slope(signals.robust[p]);
     inverse_bound[p] = modes[p] != 0 && error[p] * network[p] >= 0.0 ? 1.0 / parameters.rbf.W_max : 0.0;
   }
 }

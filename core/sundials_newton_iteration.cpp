@@ -17,6 +17,8 @@ namespace {
 // The Jacobian is exact but for the coupling that the solver may leave out, so a fresh factorization contracts well.
 constexpr Real rate_after_factorization = 0.1;
 
+constexpr int most_careful_iterations = 20;
+
 int rate_failure(int result) { return result < 0 ? CV_RHSFUNC_FAIL : SUN_NLS_CONV_RECVR; }
 
 }  // namespace
@@ -65,67 +67,78 @@ void NewtonIteration::reset() {
   iterations_ = 0;
 }
 
+NewtonIteration::Step NewtonIteration::step_of(void* cvode) {
+  Step step{};
+  N_Vector predicted = nullptr;
+  N_Vector iterate = nullptr;
+  N_Vector rate = nullptr;
+  N_Vector zn1 = nullptr;
+  void* user_data = nullptr;
+  CVodeGetNonlinearSystemData(cvode, &step.t, &predicted, &iterate, &rate, &step.gamma, &step.rl1, &zn1, &user_data);
+  step.predicted = NV_DATA_S(predicted);
+  step.zn1 = NV_DATA_S(zn1);
+  step.y = NV_DATA_S(iterate);
+  step.f = NV_DATA_S(rate);
+  return step;
+}
+
 int NewtonIteration::solve(N_Vector correction, N_Vector weight, Real tolerance, bool factorize, void* cvode) {
   Real* c = NV_DATA_S(correction);  // CVODE has set it to zero
   const Real* w = NV_DATA_S(weight);
   last_iterations_ = last_failures_ = 0;
-  int result = iterate(c, w, tolerance, factorize, false, cvode);
-  if (result == SUN_NLS_CONV_RECVR && !jacobian_is_current_) {
-    ++last_failures_;
-    std::fill_n(c, delta_.size(), 0.0);
-    result = iterate(c, w, tolerance, true, true, cvode);
-  }
+  step_ = step_of(cvode);
+  std::copy_n(step_.predicted, delta_.size(), step_.y);
+  int result = iterate(c, w, tolerance, factorize ? Factorize::once : Factorize::never, cvode);
+  if (result == SUN_NLS_CONV_RECVR) result = iterate_again(c, w, tolerance, cvode);
   if (result == 0) jacobian_is_current_ = false;
   return result;
 }
 
-int NewtonIteration::iterate(Real* correction, const Real* weight, Real tolerance, bool factorize, bool bad_jacobian,
-                             void* cvode) {
+int NewtonIteration::iterate_again(Real* correction, const Real* weight, Real tolerance, void* cvode) {
+  ++last_failures_;
+  const auto n = static_cast<std::int64_t>(delta_.size());
+  std::copy_n(step_.predicted, n, delta_.data());
+  const bool moved = system_.move_start(step_.y, delta_.data());
+  if (!moved && jacobian_is_current_) return SUN_NLS_CONV_RECVR;
+  std::copy_n(delta_.data(), n, step_.y);
+  kernels().linear_sum(n, 1.0, step_.y, -1.0, step_.predicted, correction);
+  return iterate(correction, weight, tolerance, moved ? Factorize::always : Factorize::once, cvode);
+}
+
+/// From the state y = predicted + correction.
+int NewtonIteration::iterate(Real* correction, const Real* weight, Real tolerance, Factorize factorize, void* cvode) {
   const Kernels& kernel = kernels();
   const auto n = static_cast<std::int64_t>(delta_.size());
-  Real t = 0.0;
-  Real gamma = 0.0;
-  Real rl1 = 0.0;
-  N_Vector predicted = nullptr;
-  N_Vector iterate = nullptr;
-  N_Vector rate_vector = nullptr;
-  N_Vector zn1 = nullptr;
-  void* user_data = nullptr;
-  CVodeGetNonlinearSystemData(cvode, &t, &predicted, &iterate, &rate_vector, &gamma, &rl1, &zn1, &user_data);
-  Real* y = NV_DATA_S(iterate);
-  Real* f = NV_DATA_S(rate_vector);
-
-  if (const int result = system_.rate(t, NV_DATA_S(predicted), f); result != 0) return rate_failure(result);
-  if (factorize) {
-    std::copy_n(NV_DATA_S(predicted), n, y);
-    SunBoolean current = 0;
-    const int result = factor_(bad_jacobian ? 1 : 0, &current, cvode);
-    jacobian_is_current_ = current != 0;
-    if (result != 0) return result;
-    factored_gamma_ = gamma;
-    convergence_rate_ = rate_after_factorization;
-  }
-  // solutions for another gamma than the factored one, brought closer
-  const Real scale = gamma == factored_gamma_ ? 1.0 : 2.0 / (1.0 + gamma / factored_gamma_);
+  const auto& [t, gamma, rl1, predicted, zn1, y, f] = step_;
+  const bool carefully = factorize == Factorize::always;
   Real last_size = 0.0;
   // a rate that is not finite makes the size so
   for (int number = 0;; ++number) {
+    if (const int result = system_.rate(t, y, f); result != 0) return rate_failure(result);
+    if (carefully || (number == 0 && factorize == Factorize::once)) {
+      SunBoolean current = 0;
+      const int result = factor_(last_failures_ != 0 ? 1 : 0, &current, cvode);
+      jacobian_is_current_ = current != 0;
+      if (result != 0) return result;
+      factored_gamma_ = gamma;
+      convergence_rate_ = rate_after_factorization;
+    }
+    // solutions for another gamma than the factored one, brought closer
+    const Real scale = gamma == factored_gamma_ ? 1.0 : 2.0 / (1.0 + gamma / factored_gamma_);
     ++iterations_;
     ++last_iterations_;
-    kernel.newton_residual(n, gamma, f, rl1, NV_DATA_S(zn1), correction, delta_.data());
+    kernel.newton_residual(n, gamma, f, rl1, zn1, correction, delta_.data());
     if (const int result = system_.solve(delta_.data()); result != 0) return result < 0 ? CV_LSOLVE_FAIL : result;
     const Real squares = kernel.add_correction(n, scale, delta_.data(), weight, correction);
     const Real size = std::sqrt(squares / static_cast<Real>(n));
     if (number > 0) convergence_rate_ = std::max(0.3 * convergence_rate_, size / last_size);
+    kernel.linear_sum(n, 1.0, predicted, 1.0, correction, y);
     const bool converged = size * std::min(1.0, convergence_rate_) <= tolerance;
-    if (converged && size <= tolerance) return 0;
-    kernel.linear_sum(n, 1.0, NV_DATA_S(predicted), 1.0, correction, y);
-    // an expected rate is a guess: it fails where the linearization does
-    if (converged && system_.linearization_defect(y, gamma, weight) <= tolerance) return 0;
-    const bool diverges = number > 0 && size > 2.0 * last_size;
-    if (diverges || number + 1 == most_iterations_ || !std::isfinite(size)) return SUN_NLS_CONV_RECVR;
+    if (converged && system_.linearization_holds(y, gamma, weight, tolerance)) return 0;
+    const bool diverges = !carefully && number > 0 && size > 2.0 * last_size;
+    const int most = carefully ? most_careful_iterations : most_iterations_;
+    if (diverges || number + 1 == most || !std::isfinite(size)) return SUN_NLS_CONV_RECVR;
     last_size = size;
-    if (const int result = system_.rate(t, y, f); result != 0) return rate_failure(result);
   }
 }
 

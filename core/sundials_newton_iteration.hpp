@@ -2,7 +2,8 @@
 //
 // A step solves  r(c) = c + rl1 zn1 - gamma f(t, ypred + c) = 0  for the correction c. It does what the library's own
 // iteration does, with each pass over the vectors done once and without copies. It expects a good rate of convergence
-// of a new factorization, and checks the linearization before it ends on such a rate.
+// of a new factorization, believes in convergence only where the linearization holds, and where it fails begins once
+// more from a place that the system knows.
 #pragma once
 
 #include <sundials/sundials_nonlinearsolver.h>
@@ -20,9 +21,12 @@ class NewtonSystem {
   virtual int rate(Real t, const Real* state, Real* rate) noexcept = 0;  ///< need not be finite
   /// Replaces b by (I - gamma J)^-1 b with gamma and J of the last factorization.
   virtual int solve(Real* b) noexcept = 0;
-  /// By how much the rates at this state, times gamma, differ from those that the factorized matrix foretells from the
-  /// state of the last evaluation: 2-norm of the weighted differences.
-  virtual Real linearization_defect(const Real* state, Real gamma, const Real* weight) noexcept = 0;
+  /// Whether the rates at this state, times gamma, are those that the factorized matrix foretells from the state of
+  /// the last evaluation, up to the tolerance in the weighted norm.
+  virtual bool linearization_holds(const Real* state, Real gamma, const Real* weight, Real tolerance) noexcept = 0;
+  /// Moves the predicted state, from which an iteration failed with this last iterate, to where one that factorizes
+  /// at each iterate will converge; false when it knows of no such place.
+  virtual bool move_start(const Real* failed, Real* predicted) noexcept = 0;
 
  protected:
   ~NewtonSystem() = default;
@@ -45,13 +49,29 @@ class NewtonIteration {
   void reset();
 
  private:
+  enum class Factorize { never, once, always };
+
+  /// The step that CVODE is at: r(c) = c + rl1 zn1 - gamma f(t, predicted + c).
+  struct Step {
+    Real t;
+    Real gamma;
+    Real rl1;
+    const Real* predicted;
+    const Real* zn1;
+    Real* y;  ///< the iterate, predicted + c
+    Real* f;  ///< the rate there
+  };
+  static Step step_of(void* cvode);
+
   int solve(N_Vector correction, N_Vector weight, Real tolerance, bool factorize, void* cvode);
-  int iterate(Real* correction, const Real* weight, Real tolerance, bool factorize, bool bad_jacobian, void* cvode);
+  int iterate(Real* correction, const Real* weight, Real tolerance, Factorize factorize, void* cvode);
+  int iterate_again(Real* correction, const Real* weight, Real tolerance, void* cvode);
 
   NewtonSystem& system_;
   SUNNonlinearSolver handle_;
   SUNNonlinSolLSetupFn factor_ = nullptr;
   int most_iterations_ = 3;
+  Step step_{};
   AlignedVector delta_;
   Real factored_gamma_ = 0.0;
   Real convergence_rate_ = 1.0;

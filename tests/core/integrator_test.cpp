@@ -223,7 +223,9 @@ TEST(Integrator, DoesNotChatterOnGrazingColumns) {
 }
 
 // With gains that the theorems ask for, the layer of the robust term is 4e-9 wide and relaxes within 1e-15 s.
-TEST(Integrator, FollowsARobustTermAsSteepAsTheTheoremsAskFor) {
+// With the gains that the paper's theorems ask for, e reaches the layer |e| < 4e-9 within microseconds and stays there,
+// and estimates agree: actions then follow the gradient play x' = -k2 grad_i f_i(x), those of first order from z(0).
+TEST(Integrator, SlidesWithARobustTermAsSteepAsTheTheoremsAskFor) {
   Game game = parse_game(text_of(paper_game));
   Gains& gains = game.parameters.gains;
   gains.k1 = 9.7e4;
@@ -234,14 +236,43 @@ TEST(Integrator, FollowsARobustTermAsSteepAsTheTheoremsAskFor) {
   gains.delta = 3.3e6;
   gains.epsilon = 0.004;
   const ClosedLoop loop(game.parameters);
+  const std::size_t n = at(loop.shape().actions());
+  std::vector<Real> state(at(loop.layout().size()));
+  loop.initial_state(state.data());
+  std::vector<Real> play(state.begin(), state.begin() + loop.shape().actions());
+  for (std::size_t p = 0; p < n; ++p) {
+    const bool second = loop.shape().is_second_order(loop.shape().player_of(static_cast<int>(p)));
+    if (!second) play[p] = state[at(loop.layout().reference()) + p];
+  }
+  const auto gradient_step = [&](Real h) {  // classical Runge-Kutta
+    std::vector<Real> sum(n, 0.0);
+    std::vector<Real> slope(n, 0.0);
+    for (const auto& [reach, share] : {std::pair{0.0, 1.0}, {0.5, 2.0}, {0.5, 2.0}, {1.0, 1.0}}) {
+      std::vector<Real> point = play;
+      for (std::size_t p = 0; p < n; ++p) point[p] += reach * h * slope[p];
+      loop.parameters().cost->own_gradients(point.data(), 0, slope.data());
+      for (Real& number : slope) number *= -gains.k2;
+      for (std::size_t p = 0; p < n; ++p) sum[p] += share / 6.0 * slope[p];
+    }
+    for (std::size_t p = 0; p < n; ++p) play[p] += h * sum[p];
+  };
+  constexpr Real end = 0.01;
+  for (int k = 0; k < 1000; ++k) gradient_step(end / 1000);
+
   const std::vector<Real> x_star = nash_equilibrium(*loop.parameters().cost, loop.shape());
   const ExternalDisturbance input(loop.shape().actions());
-  for (const Real tolerance : {1e-8, 1e-9, 1e-10, 1e-11}) {
+  for (const Real tolerance : {1e-4, 1e-5, 3e-6, 1e-6, 3e-7, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11}) {
     Integrator integrator(loop, input, make_newton_solver(loop.shape()));
     integrator.start(0.0, {tolerance, 0.01 * tolerance});
-    for (int k = 1; k <= 500; ++k) integrator.advance(0.001 * k);
-    EXPECT_LT(integrator.statistics().steps, 10'000) << tolerance;
-    for (std::size_t p = 0; p < x_star.size(); ++p) EXPECT_NEAR(integrator.state()[p], x_star[p], 1e-6) << tolerance;
+    integrator.advance(end);
+    const Real allowed = 1e-3 + 100.0 * tolerance;  // k2 / k3 and the time to reach the layer count too
+    for (std::size_t p = 0; p < n; ++p) EXPECT_NEAR(integrator.state()[p], play[p], allowed) << tolerance << " " << p;
+    for (int k = 1; k <= 500; ++k) integrator.advance(end + 0.001 * k);
+    EXPECT_LT(integrator.statistics().steps, 5'000) << tolerance;
+    EXPECT_LT(integrator.statistics().rate_evaluations, 15'000) << tolerance;
+    for (std::size_t p = 0; p < n; ++p) {
+      EXPECT_NEAR(integrator.state()[p], x_star[p], 1e-6 + 10.0 * tolerance) << tolerance;
+    }
   }
 }
 

@@ -69,24 +69,43 @@ class Stepper final : public NewtonSystem {
   Stepper& operator=(const Stepper&) = delete;
 
   int advance(Real t) { return CVode(cvode_, t, state_, &time_, CV_NORMAL); }
+  /// Where an iteration that failed begins again.
+  void set_move(std::function<bool(const Vector&, Eigen::Map<Vector>&)> move) { move_ = std::move(move); }
+  [[nodiscard]] int moves() const { return moves_; }
+  [[nodiscard]] long steps() const {
+    long steps = 0;
+    CVodeGetNumSteps(cvode_, &steps);
+    return steps;
+  }
+
   [[nodiscard]] Real time() const { return time_; }
   [[nodiscard]] Real state(int k) const { return NV_Ith_S(state_, k); }
   [[nodiscard]] Real iterations_per_step() const {
-    long steps = 0;
-    CVodeGetNumSteps(cvode_, &steps);
-    return static_cast<Real>(iteration_->iterations()) / static_cast<Real>(steps);
+    return static_cast<Real>(iteration_->iterations()) / static_cast<Real>(steps());
   }
 
  private:
   int rate(Real /*t*/, const Real* state, Real* rate) noexcept override {
+    evaluated_ = Eigen::Map<const Vector>(state, size_);
     Eigen::Map<Vector>(rate, size_) = rates_(Eigen::Map<const Vector>(state, size_));
     return 0;
   }
-  Real linearization_defect(const Real* /*state*/, Real /*gamma*/, const Real* /*weight*/) noexcept override {
-    return 0.0;
+  /// The correction that another iteration would make, with a Jacobian of its own.
+  bool linearization_holds(const Real* state, Real gamma, const Real* weight, Real tolerance) noexcept override {
+    const Eigen::Map<const Vector> y(state, size_);
+    const Vector missed = gamma * (rates_(y) - rates_(evaluated_) - factored_ * (y - evaluated_));
+    const Vector correction = (Matrix::Identity(size_, size_) - gamma * jacobian_(y)).partialPivLu().solve(missed);
+    return correction.cwiseProduct(Eigen::Map<const Vector>(weight, size_)).norm() <= tolerance;
+  }
+  bool move_start(const Real* failed, Real* predicted) noexcept override {
+    if (move_ == nullptr) return false;
+    Eigen::Map<Vector> moved(predicted, size_);
+    ++moves_;
+    return move_(Eigen::Map<const Vector>(failed, size_), moved);
   }
   void factor(const Real* state, Real gamma) {
-    factors_.compute(Matrix::Identity(size_, size_) - gamma * jacobian_(Eigen::Map<const Vector>(state, size_)));
+    factored_ = jacobian_(Eigen::Map<const Vector>(state, size_));
+    factors_.compute(Matrix::Identity(size_, size_) - gamma * factored_);
   }
   int solve(Real* b) noexcept override {
     Eigen::Map<Vector> rhs(b, size_);
@@ -96,8 +115,12 @@ class Stepper final : public NewtonSystem {
 
   std::function<Vector(const Vector&)> rates_;
   std::function<Matrix(const Vector&)> jacobian_;
+  std::function<bool(const Vector&, Eigen::Map<Vector>&)> move_;
   int size_;
+  int moves_ = 0;
   Real time_ = 0.0;
+  Vector evaluated_;
+  Matrix factored_;
   Eigen::PartialPivLU<Matrix> factors_;
   SUNContext context_ = nullptr;
   N_Vector state_ = nullptr;
@@ -141,6 +164,30 @@ TEST(NewtonIteration, StopsWhereTheRatesAreNoLongerFinite) {
   // y_0 = exp(t) - 1 reaches 1.5 at log(2.5)
   EXPECT_NEAR(stepper.time(), std::log(2.5), 1e-6);
   EXPECT_NEAR(stepper.state(1), 0.4, 1e-6);
+}
+
+// y_0' = (1 + cos y_1) / 4 - tanh(y_0 / width) reaches y_0 = 0 and slides there.
+TEST(NewtonIteration, BeginsAgainWhereTheSystemKnows) {
+  using Vector = Eigen::VectorXd;
+  using Matrix = Eigen::MatrixXd;
+  constexpr Real width = 1e-11;
+  const auto slide = [](Real y1) { return (1.0 + std::cos(y1)) / 4.0; };
+  Stepper stepper([&](const Vector& y) { return Vector{{slide(y[1]) - std::tanh(y[0] / width), 1.0}}; },
+                  [&](const Vector& y) {
+                    const Real tanh = std::tanh(y[0] / width);
+                    return Matrix{{-(1.0 - tanh * tanh) / width, -std::sin(y[1]) / 4.0}, {0.0, 0.0}};
+                  },
+                  Vector{{1.0, 0.0}}, 1e-6, Vector{{1e-8, 1e-8}});
+  stepper.set_move([](const Vector& failed, Eigen::Map<Vector>& predicted) {
+    EXPECT_NE(failed[0], predicted[0]);
+    predicted[0] = 0.0;
+    return true;
+  });
+  ASSERT_EQ(stepper.advance(10.0), CV_SUCCESS);
+  EXPECT_NEAR(stepper.state(0), 0.0, 1e-8);
+  EXPECT_NEAR(stepper.state(1), 10.0, 1e-4);
+  EXPECT_GT(stepper.moves(), 0);
+  EXPECT_LT(stepper.steps(), 300);
 }
 
 }  // namespace

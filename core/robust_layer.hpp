@@ -1,0 +1,38 @@
+// The layer |e| <= epsilon / (K delta) within which the robust term phi = delta tanh(K delta e / epsilon) bends.
+//
+// An implicit step solves, apart from nearly linear terms, an equation  e + a phi(e) = c  for each column. A step may
+// lead from one side of the layer to the other, or into it: a strategy with a large delta or a small epsilon slides
+// within a layer that is far thinner than the step. A Newton iteration then believes in a slope that is not there.
+#pragma once
+
+#include "loop_jacobian.hpp"
+
+namespace mixed_order_game {
+
+class RobustLayer {
+ public:
+  explicit RobustLayer(const ClosedLoop& loop);
+
+  /// Whether phi at this state is what the linearization foretells: gamma times the differences, as far as the solution
+  /// follows them, weighted like the rates that they enter, up to the tolerance in the 2-norm. Signals belong to the
+  /// state that the last correction set out from, slopes to the factorized Jacobian. A solution follows a difference by
+  /// 1 / (1 + gamma slope) of it, with the lesser of the slopes foretold and found.
+  [[nodiscard]] bool linearization_holds(const LoopJacobian& jacobian, const Signals& signals, const Real* state,
+                                         Real gamma, const Real* weight, Real tolerance);
+
+  /// Moves a predicted state, from which an iteration failed, to the middle e = 0 of the layer in all columns that
+  /// the iteration carried across, by their velocity or (order 1) action; false when there is none. On either side of
+  /// the middle e + a phi(e) is concave or convex, so that Newton's iteration with a Jacobian of its own at each
+  /// iterate converges from there without jumping. Signals are those of the failed iteration's last evaluation.
+  bool move_to_middle(const Signals& signals, const Real* failed, Real* predicted);
+
+ private:
+  /// Where the state holds the number that column p's error follows one to one.
+  [[nodiscard]] int place_of(int p) const;
+
+  const ClosedLoop& loop_;
+  Signals trial_;
+  AlignedVector failed_;  // phi
+};
+
+}  // namespace mixed_order_game

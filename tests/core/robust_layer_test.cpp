@@ -1,0 +1,154 @@
+#include "robust_layer.hpp"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+
+#include "game.hpp"
+#include "reference_loop.hpp"
+
+namespace mixed_order_game {
+namespace {
+
+using testing::assorted_recipes;
+using testing::PlainGame;
+using testing::random_game;
+using testing::random_state;
+using testing::RandomNumbers;
+using testing::toml_of;
+
+constexpr Real K = 0.2784645427610738;
+
+/// A loop with a robust term, linearized at a state.
+struct Linearized {
+  Linearized(const testing::Recipe& recipe, unsigned seed)
+      : game(random_game(recipe)),
+        random(seed),
+        loop(parse_game(toml_of(game)).parameters),
+        modes(at(loop.shape().actions())),
+        state(random_state(game, random, on_sphere).flat()),
+        signals(loop.shape()),
+        jacobian(loop),
+        layer(loop) {
+    loop.evaluate_seeking(state.data(), signals);
+    jacobian.linearize(state.data(), signals, modes);
+  }
+  [[nodiscard]] std::size_t place(int p) const {
+    const bool second = loop.shape().is_second_order(loop.shape().player_of(p));
+    return at((second ? loop.layout().reference() : loop.layout().x()) + p);
+  }
+  [[nodiscard]] Real phi(Real e) const {
+    const Gains& gains = loop.parameters().gains;
+    return gains.delta * std::tanh(K * gains.delta * e / gains.epsilon);
+  }
+  /// A state that differs from this one by up to the size in each entry.
+  [[nodiscard]] std::vector<Real> near(const std::vector<Real>& from, Real size) {
+    std::vector<Real> moved = from;
+    for (Real& number : moved) number += random.between(-size, size);
+    return moved;
+  }
+  [[nodiscard]] std::vector<Real> errors(const std::vector<Real>& at_state) const {
+    Signals there(loop.shape());
+    loop.evaluate_errors(at_state.data(), there);
+    return {there.error.begin(), there.error.end()};
+  }
+
+  std::vector<std::vector<int>> on_sphere;
+  PlainGame game;
+  RandomNumbers random;
+  ClosedLoop loop;
+  Modes modes;
+  std::vector<Real> state;
+  Signals signals;
+  LoopJacobian jacobian;
+  RobustLayer layer;
+};
+
+TEST(RobustLayer, TellsWhetherTheLinearizationHolds) {
+  int checked = 0;
+  for (const testing::Recipe& recipe : assorted_recipes()) {
+    if (!recipe.robust) continue;
+    Linearized loop(recipe, 5);
+    for (const Real size : {1e-4, 1e-2, 1.0, 100.0}) {
+      // the Jacobian's state, the last evaluation's and the new one all differ
+      const std::vector<Real> evaluated = loop.near(loop.state, size);
+      const std::vector<Real> state = loop.near(evaluated, size);
+      const std::vector<Real> weight = loop.near(std::vector<Real>(state.size(), 2.0), 1.0);
+      const Real gamma = loop.random.between(0.0, 0.2);
+      const std::vector<Real> e0 = loop.errors(loop.state);
+      const std::vector<Real> e1 = loop.errors(evaluated);
+      const std::vector<Real> e2 = loop.errors(state);
+      Real sum = 0.0;
+      for (std::size_t p = 0; p < e0.size(); ++p) {
+        const Gains& gains = loop.loop.parameters().gains;
+        const auto slope_at = [&](Real e) {
+          return K * gains.delta * gains.delta / gains.epsilon /
+                 std::pow(std::cosh(K * gains.delta * e / gains.epsilon), 2);
+        };
+        const Real slope = slope_at(e0[p]);
+        const Real missed = loop.phi(e2[p]) - loop.phi(e1[p]) - slope * (e2[p] - e1[p]);
+        sum += std::pow(
+            gamma * missed / (1.0 + gamma * std::min(slope, slope_at(e2[p]))) * weight[loop.place(static_cast<int>(p))],
+            2);
+      }
+      const Real defect = std::sqrt(sum);
+      loop.loop.evaluate_seeking(evaluated.data(), loop.signals);
+      const auto holds = [&](Real tolerance) {
+        return loop.layer.linearization_holds(loop.jacobian, loop.signals, state.data(), gamma, weight.data(),
+                                              tolerance);
+      };
+      EXPECT_TRUE(holds(1.0001 * defect + 1e-13)) << size;
+      if (defect < 1e-10) continue;
+      EXPECT_FALSE(holds(0.9999 * defect)) << size;
+      ++checked;
+    }
+  }
+  EXPECT_GT(checked, 20);
+}
+
+TEST(RobustLayer, MovesToTheMiddleWhatAnIterationCarriedAcross) {
+  Linearized loop({.seed = 11, .players = 4, .dimension = 3, .neurons = 2, .order = {1, 2, 2, 1}}, 9);
+  const Gains& gains = loop.loop.parameters().gains;
+  const Real layer = gains.epsilon / (K * gains.delta);
+  const auto with_errors = [&](auto wanted) {  // in layers
+    std::vector<Real> state = loop.state;
+    const std::vector<Real> errors = loop.errors(state);
+    for (int p = 0; p < 12; ++p) state[loop.place(p)] += wanted(p) * layer - errors[at(p)];
+    return state;
+  };
+  // by p mod 4: stays outside; carried across and back; carried across; moves a little within the layer
+  const auto choose = [](int p, Real a, Real b, Real c, Real d) { return std::array{a, b, c, d}[at(p % 4)]; };
+  const std::vector<Real> start = with_errors([&](int p) { return choose(p, -5.0, 4.0, -3.0, 0.1); });
+  const std::vector<Real> evaluated = with_errors([&](int p) { return choose(p, -7.0, -4.0, -2.0, 0.3); });
+  const std::vector<Real> failed = with_errors([&](int p) { return choose(p, -2.0, 6.0, 5.0, -0.1); });
+  loop.loop.evaluate_seeking(evaluated.data(), loop.signals);
+  std::vector<Real> moved = start;
+  EXPECT_TRUE(loop.layer.move_to_middle(loop.signals, failed.data(), moved.data()));
+  const std::vector<Real> errors = loop.errors(moved);
+  std::vector<Real> expected = start;
+  for (int p = 0; p < 12; ++p) {
+    if (p % 4 != 1 && p % 4 != 2) continue;
+    EXPECT_NEAR(errors[at(p)], 0.0, 1e-12 * std::fabs(moved[loop.place(p)]) + 1e-15) << p;
+    expected[loop.place(p)] = moved[loop.place(p)];
+  }
+  EXPECT_EQ(moved, expected);
+  // nothing was carried across
+  loop.loop.evaluate_seeking(start.data(), loop.signals);
+  std::vector<Real> kept = start;
+  EXPECT_FALSE(loop.layer.move_to_middle(loop.signals, start.data(), kept.data()));
+  EXPECT_EQ(kept, start);
+}
+
+TEST(RobustLayer, IsNotThereWithoutTheRobustTerm) {
+  Linearized loop({.seed = 12, .players = 3, .dimension = 1, .neurons = 4, .robust = false}, 2);
+  std::vector<Real> state = loop.state;
+  const std::vector<Real> weight(state.size(), 1.0);
+  const std::vector<Real> far = loop.near(state, 1e3);
+  EXPECT_TRUE(loop.layer.linearization_holds(loop.jacobian, loop.signals, far.data(), 1.0, weight.data(), 0.0));
+  EXPECT_FALSE(loop.layer.move_to_middle(loop.signals, far.data(), state.data()));
+  EXPECT_EQ(state, loop.state);
+}
+
+}  // namespace
+}  // namespace mixed_order_game
