@@ -4,6 +4,7 @@ Reads modelDescription.xml (through fmpy) and resources/game.toml from the archi
 """
 
 import difflib
+import sys
 import tomllib
 import zipfile
 from collections.abc import Iterable, Mapping, Sequence
@@ -184,6 +185,17 @@ class Model:
         return values
 
 
+def _range_of(variable: Variable) -> str:
+    low, high = variable.minimum, variable.maximum
+    if high is None and low == sys.float_info.min:  # how a schema says "positive"
+        return "a positive number"
+    if high is None:
+        return f"a number of at least {low:g}"
+    if low is None:
+        return f"a number of at most {high:g}"
+    return f"a number from {low:g} to {high:g}"
+
+
 def check_value(variable: Variable, value: object, *, during_run: bool = False) -> Value:
     """The value as float, int or bool, if the variable can be set to it at that time.
 
@@ -208,9 +220,7 @@ def check_value(variable: Variable, value: object, *, during_run: bool = False) 
     below = variable.minimum is not None and value < variable.minimum
     above = variable.maximum is not None and value > variable.maximum
     if below or above:
-        low = "-inf" if variable.minimum is None else f"{variable.minimum:g}"
-        high = "inf" if variable.maximum is None else f"{variable.maximum:g}"
-        raise VariableError(f"{name} = {value:g} is outside its range [{low}, {high}]")
+        raise VariableError(f"{name} is {value:g}, expected {_range_of(variable)}")
     return float(value)
 
 

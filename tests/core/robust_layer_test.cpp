@@ -107,6 +107,45 @@ TEST(RobustLayer, TellsWhetherTheLinearizationHolds) {
   EXPECT_GT(checked, 20);
 }
 
+/// The weighted difference between phi after a step from e0 to e1 and what the linearization at e0 foretells.
+Real defect_of(const Linearized& loop, Real gamma, Real weight, Real e0, Real e1) {
+  const Gains& gains = loop.loop.parameters().gains;
+  const auto slope = [&](Real e) {
+    return K * gains.delta * gains.delta / gains.epsilon / std::pow(std::cosh(K * gains.delta * e / gains.epsilon), 2);
+  };
+  const Real missed = loop.phi(e1) - loop.phi(e0) - slope(e0) * (e1 - e0);
+  return std::fabs(gamma * missed / (1.0 + gamma * std::min(slope(e0), slope(e1))) * weight);
+}
+
+TEST(RobustLayer, TellsSoForAnyStepInAStiffLayer) {
+  Linearized loop({.seed = 21, .players = 2, .dimension = 1, .neurons = 1, .order = {1, 2}}, 3);
+  const Gains& gains = loop.loop.parameters().gains;
+  const Real layer = gains.epsilon / (K * gains.delta);
+  const Real gamma = 1e3 * layer / gains.delta;  // a thousand times the inverse of the steepest slope
+  const std::vector<Real> weight(loop.state.size(), 3.0);
+  const auto with_error = [&](Real error) {
+    std::vector<Real> state = loop.state;
+    state[0] += error - loop.errors(loop.state)[0];
+    return state;
+  };
+  for (Real from = -3.0; from <= 3.0; from += 0.125) {
+    const std::vector<Real> start = with_error(from * layer);
+    loop.loop.evaluate_seeking(start.data(), loop.signals);
+    loop.jacobian.linearize(start.data(), loop.signals, loop.modes);
+    for (Real to = -3.0; to <= 3.0; to += 0.125) {
+      const std::vector<Real> state = with_error(to * layer);
+      const Real defect = defect_of(loop, gamma, 3.0, from * layer, to * layer);
+      if (defect < 1e-8) continue;
+      for (const Real part : {0.5, 0.9, 0.999, 1.001}) {
+        EXPECT_EQ(loop.layer.linearization_holds(loop.jacobian, loop.signals, state.data(), gamma, weight.data(),
+                                                 part * defect),
+                  part > 1.0)
+            << from << " " << to << " " << part;
+      }
+    }
+  }
+}
+
 TEST(RobustLayer, MovesToTheMiddleWhatAnIterationCarriedAcross) {
   Linearized loop({.seed = 11, .players = 4, .dimension = 3, .neurons = 2, .order = {1, 2, 2, 1}}, 9);
   const Gains& gains = loop.loop.parameters().gains;

@@ -83,7 +83,7 @@ def test_wrong_usage_exits_with_2(arguments: list[str]) -> None:
         (["--set", "k1=nan"], "k1 must be finite"),
         (["--set", "k1=true"], "k1 is a number"),
         (["--set", "robust=1"], "robust is true or false"),
-        (["--set", "a[1,2]=-1"], "outside its range"),
+        (["--set", "a[1,2]=-1"], "expected a number of at least 0"),
         (["--set", "a[1,2]=0", "--set", "a[2,3]=0"], "connected"),
         (["--stop-time", "0"], "stop_time"),
         (["--step", "-1"], "step"),

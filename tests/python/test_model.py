@@ -69,7 +69,8 @@ def test_unknown_names_come_with_the_nearest(name: str, hint: str, fmu: Path) ->
         ("k1", True, "k1 is a number, not True"),
         ("k1", float("nan"), "k1 must be finite"),
         ("k1", float("inf"), "k1 must be finite"),
-        ("a[1,2]", -1.0, "a[1,2] = -1 is outside its range [0, inf]"),
+        ("a[1,2]", -1.0, "a[1,2] is -1, expected a number of at least 0"),
+        ("k3", -1.0, "k3 is -1, expected a positive number"),
         ("robust", 1.0, "robust is true or false, not 1.0"),
     ],
 )

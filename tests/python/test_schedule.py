@@ -148,7 +148,7 @@ def test_disturbance_round_trip(tmp_path: Path, model: Model) -> None:
         ("a.csv", 'time,"a[1,9]"\n0,1\n', "there is no variable a[1,9]"),
         ("a.csv", 'time,"a[1,2]"\n0,x\n', "row 2: 'x' is not a number"),
         ("a.csv", 'time,"a[1,2]"\n0,nan\n', "row 2: 'nan' is not finite"),
-        ("a.csv", 'time,"a[1,2]"\n0,-1\n', "a[1,2] = -1 is outside its range"),
+        ("a.csv", 'time,"a[1,2]"\n0,-1\n', "a[1,2] is -1, expected a number of at least 0"),
         ("a.csv", 'time,"a[1,2]"\n0,1,2\n', "row 2 has 3 cells, the header has 2"),
         ("a.csv", 'time,"a[1,2]"\n1,1\n1,0\n', "the times do not go up at row 3"),
         ("a.csv", 'time,"a[1,2]"\n,1\n', "the times do not go up at row 2"),
