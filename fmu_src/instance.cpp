@@ -110,27 +110,31 @@ void Instance::reset() {
 }
 
 int Instance::known(std::uint32_t reference, Type type) const {
-  if (reference >= at(model_.variables.size())) {
+  if (reference < at(model_.variables.size())) {
+    const auto number = static_cast<int>(reference);
+    if (model_.variables.variable(number).type == type) return number;
+  }
+  refuse(reference, type);
+}
+
+void Instance::refuse(std::uint32_t reference, Type type) const {
+  const ModelVariables& variables = model_.variables;
+  if (reference >= at(variables.size())) {
     throw Error("value reference " + std::to_string(reference) + " is unknown, expected less than " +
-                std::to_string(model_.variables.size()));
+                std::to_string(variables.size()));
   }
   const auto number = static_cast<int>(reference);
-  const Type actual = model_.variables.family(number).type;
-  if (actual != type) {
-    throw Error(model_.variables.name(number) + " has the type " + std::string(name_of(actual)) + ", not " +
-                std::string(name_of(type)));
-  }
-  return number;
+  throw Error(variables.name(number) + " has the type " + std::string(name_of(variables.variable(number).type)) +
+              ", not " + std::string(name_of(type)));
 }
 
 void Instance::get(Type type, std::span<const std::uint32_t> references, Real* values) {
   const ModelVariables& variables = model_.variables;
   Stages needed{};
   for (const std::uint32_t reference : references) {
-    needed[static_cast<std::size_t>(variables.family(known(reference, type)).stage)] = true;
+    needed[static_cast<std::size_t>(variables.variable(known(reference, type)).stage)] = true;
   }
-  prepare(needed);
-  const View source = evaluation_.view(settings_, standing());
+  const View source = evaluation_.view(settings_, prepare(needed));
   scratch_.resize(references.size());
   for (std::size_t k = 0; k < references.size(); ++k) {
     const auto reference = static_cast<int>(references[k]);
@@ -265,8 +269,7 @@ View Instance::prepare_tangent(std::span<const std::uint32_t> references) {
   for (const std::uint32_t reference : references) {
     needed[static_cast<std::size_t>(model_.variables.family(static_cast<int>(reference)).stage)] = true;
   }
-  prepare(needed);
-  return evaluation_.view(settings_, standing());
+  return evaluation_.view(settings_, prepare(needed));
 }
 
 void Instance::read_along(std::span<const std::uint32_t> references, const View& source, const Tangent& tangent,
@@ -293,12 +296,14 @@ void Instance::act() {
   touched_ = Change::none;
 }
 
-void Instance::prepare(const Stages& needed) {
+Standing Instance::prepare(const Stages& needed) {
   const auto is_needed = [&](Stage stage) { return needed[static_cast<std::size_t>(stage)]; };
   if (is_needed(Stage::state) || is_needed(Stage::signals) || is_needed(Stage::equilibrium)) act();
+  const Standing now = standing();
   for (const Stage stage : {Stage::input, Stage::signals, Stage::equilibrium}) {
-    if (is_needed(stage)) evaluation_.prepare(stage, settings_, standing());
+    if (is_needed(stage)) evaluation_.prepare(stage, settings_, now);
   }
+  return now;
 }
 
 Tolerances Instance::tolerances() const {

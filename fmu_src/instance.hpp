@@ -84,11 +84,13 @@ class Instance {
  private:
   using Stages = std::array<bool, static_cast<std::size_t>(Stage::equilibrium) + 1>;
 
+  /// The reference of a variable of this type; anything else is refused.
   [[nodiscard]] int known(std::uint32_t reference, Type type) const;
+  [[noreturn]] void refuse(std::uint32_t reference, Type type) const;
   [[nodiscard]] Standing standing() const;
   [[nodiscard]] Tolerances tolerances() const;
   void act();
-  void prepare(const Stages& needed);
+  Standing prepare(const Stages& needed);
   [[nodiscard]] View prepare_tangent(std::span<const std::uint32_t> references);
   void read_along(std::span<const std::uint32_t> references, const View& source, const Tangent& tangent, Real* values);
   void settings_changed(Change change, bool equilibrium_moved);

@@ -228,7 +228,9 @@ class ModelVariables::Builder {
     family.first = table_.size();
     family.count = static_cast<int>(elements.size());
     const int number = static_cast<int>(table_.families_.size());
-    for (const auto& [slot, index] : elements) table_.variables_.push_back({number, slot, index});
+    for (const auto& [slot, index] : elements) {
+      table_.variables_.push_back({number, slot, index, family.type, family.stage, family.read});
+    }
     table_.families_.push_back(std::move(family));
   }
   int last_family() const { return static_cast<int>(table_.families_.size()) - 1; }

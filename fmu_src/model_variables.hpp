@@ -75,6 +75,10 @@ struct Variable {
   int family = 0;
   int slot = 0;                ///< position in the arrays of the core
   std::array<int, 3> index{};  ///< public indices, from one; 0 where there is none
+  // the family's, side by side for the calls that importers make after every step
+  Type type = Type::real;
+  Stage stage = Stage::settings;
+  Real (*read)(const View& view, int slot) = nullptr;
 };
 
 class ModelVariables {
@@ -96,7 +100,8 @@ class ModelVariables {
   [[nodiscard]] const std::vector<int>& states() const { return states_; }
 
   [[nodiscard]] Real read(int reference, const View& view) const {
-    return family(reference).read(view, variable(reference).slot);
+    const Variable& one = variable(reference);
+    return one.read(view, one.slot);
   }
 
   /// All settings as numbers, in the order of the table, followed by the input polynomials.
