@@ -210,7 +210,7 @@ Integrator::Implementation::Implementation(const ClosedLoop& loop, const Externa
   CVodeSetNoInactiveRootWarn(memory);
   // Factorizations cost about as much as an iteration here, so they are renewed often, and the step follows the error
   // closely. With the iteration's own tests that took 30 % less work at equal error at N = 5, 10 % from N = 20 to 100.
-  CVodeSetNonlinConvCoef(memory, 0.2);
+  CVodeSetNonlinConvCoef(memory, 0.25);
   CVodeSetLSetupFrequency(memory, 5);
   CVodeSetDeltaGammaMaxLSetup(memory, 0.05);
   CVodeSetEtaFixedStepBounds(memory, 0.0, 1.1);
