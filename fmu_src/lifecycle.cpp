@@ -1,6 +1,5 @@
 #include "lifecycle.hpp"
 
-#include <algorithm>
 #include <iterator>
 
 namespace mixed_order_game {
@@ -80,13 +79,16 @@ constexpr std::string_view phase_names[] = {"instantiated", "initialization mode
                                             "event mode",   "continuous-time mode", "terminated",
                                             "error"};
 static_assert(std::size(phase_names) == phases);
-static_assert(std::size(call_rules) == static_cast<std::size_t>(Call::get_nominals) + 1);
 
-const CallRule& rule_of(Call call) {
-  const auto* found = std::find_if(std::begin(call_rules), std::end(call_rules),
-                                   [&](const CallRule& rule) { return rule.call == call; });
-  return *found;
+constexpr bool in_order_of_calls() {
+  for (std::size_t k = 0; k < std::size(call_rules); ++k) {
+    if (static_cast<std::size_t>(call_rules[k].call) != k) return false;
+  }
+  return std::size(call_rules) == static_cast<std::size_t>(Call::get_nominals) + 1;
 }
+static_assert(in_order_of_calls());
+
+constexpr const CallRule& rule_of(Call call) { return call_rules[static_cast<std::size_t>(call)]; }
 
 }  // namespace
 
