@@ -46,18 +46,23 @@ class StructuredNewton final : public NewtonSolver {
   // sizes
   int n_ = 0;                         // N D
   int functional_count_ = 0;          // K: how many numbers the activations of one player depend on
+  std::vector<int> player_;           // per entry
   std::vector<std::uint8_t> second_;  // per entry: order 2
   std::vector<int> first_order_;      // per entry: number of dx in the core system, -1 for order 2
+  std::vector<int> hessian_gain_;     // per entry of the Hessian rows: where its dy_i / dxbar lies
 
   // weights; all per column p
-  AlignedVector stiffness_;   // k1 or k4, plus d phi/d e, plus A
-  AlignedVector inverse_a2_;  // h = S'b / a2
+  AlignedVector stiffness_;       // k1 or k4, plus d phi/d e, plus A
+  AlignedVector inverse_driven_;  // 1 / (1 + gamma stiffness)
+  AlignedVector inverse_a2_;      // h = S'b / a2
   AlignedVector inverse_a1_;
-  AlignedVector squares_;             // |S|^2
-  AlignedVector scratch_;             // 2 n
-  AlignedVector sensitivity_;         // kappa'dS = sum_k sensitivity[k * n + p] functional[k * n + p]
-  AlignedVector weight_sensitivity_;  // w'dS likewise
-  AlignedVector zeros_, ones_;
+  AlignedVector squares_;       // |S|^2
+  AlignedVector network_gain_;  // A
+  // a1 dw = b + gamma beta (S - r w) de + gamma beta e (dS - theta w d(w'S))
+  AlignedVector activation_per_error_, weight_per_error_, activation_share_, weight_per_network_;
+  AlignedVector scratch_;      // 2 n
+  AlignedVector sensitivity_;  // kappa'dS = sum_k sensitivity[k * n + p] functional[k * n + p]
+  AlignedVector ones_;
 
   // one solve
   AlignedVector functionals_;  // k * n + p: functional k of the player of p
@@ -65,7 +70,7 @@ class StructuredNewton final : public NewtonSolver {
   AlignedVector core_rhs_;
   AlignedVector shared_;    // dxbar
   AlignedVector gradient_;  // Hessian rows times dy
-  AlignedVector from_error_, from_activation_, onto_weight_;
+  AlignedVector from_error_, onto_weight_;
   AlignedVector activation_change_;
 };
 
@@ -76,22 +81,25 @@ void StructuredNewton::refresh(const LoopJacobian& jacobian) {
   n_ = shape.actions();
   blocks_.analyse(parameters.graph);
   functional_count_ = parameters.rbf.diagonal ? 2 : 1 + shape.neurons;
+  player_.resize(at(n_));
   second_.resize(at(n_));
   first_order_.resize(at(n_));
   int unknowns = n_;
   for (int p = 0; p < n_; ++p) {
+    player_[at(p)] = shape.player_of(p);
     second_[at(p)] = shape.is_second_order(shape.player_of(p)) ? 1 : 0;
     first_order_[at(p)] = second_[at(p)] != 0 ? -1 : unknowns++;
   }
   const std::size_t n = at(n_);
   const std::size_t weights = n * at(shape.neurons);
-  for (AlignedVector* vector : {&stiffness_, &inverse_a2_, &inverse_a1_, &squares_, &network_rhs_, &shared_, &gradient_,
-                                &from_error_, &from_activation_, &onto_weight_, &zeros_}) {
+  for (AlignedVector* vector : {&stiffness_, &inverse_driven_, &inverse_a2_, &inverse_a1_, &squares_, &network_gain_,
+                                &activation_per_error_, &weight_per_error_, &activation_share_, &weight_per_network_,
+                                &network_rhs_, &shared_, &gradient_, &from_error_, &onto_weight_}) {
     vector->assign(n, 0.0);
   }
   ones_.assign(at(std::max(n_, shape.neurons)), 1.0);
   scratch_.assign(2 * n, 0.0);
-  for (AlignedVector* vector : {&sensitivity_, &weight_sensitivity_, &functionals_}) {
+  for (AlignedVector* vector : {&sensitivity_, &functionals_}) {
     vector->assign(n * at(functional_count_), 0.0);
   }
   activation_change_.assign(weights, 0.0);
@@ -101,6 +109,12 @@ void StructuredNewton::refresh(const LoopJacobian& jacobian) {
   std::vector<std::vector<int>> rows(at(unknowns));
   const SparseRows& hessian = parameters.cost->hessian_pattern();
   const SparseRows& dynamics = parameters.dynamics->jacobian_pattern();
+  hessian_gain_.clear();
+  for (int p = 0; p < n_; ++p) {
+    for (int k = hessian.start[at(p)]; k < hessian.start[at(p + 1)]; ++k) {
+      hessian_gain_.push_back(player_[at(p)] * shape.players + player_[at(hessian.column[at(k)])]);
+    }
+  }
   for (int p = 0; p < n_; ++p) {
     const int driven = second_[at(p)] != 0 ? p : first_order_[at(p)];
     rows[at(p)].push_back(p);
@@ -130,33 +144,43 @@ void StructuredNewton::factor_weights() {
   for (int p = 0; p < n_; ++p) stiffness_[at(p)] = (second_[at(p)] != 0 ? gains.k4 : gains.k1) + jacobian.slope[at(p)];
   if (!parameters.strategy.robust) return;
 
+  const Real* activation = jacobian.activation.data();
   Real* centered_squares = scratch_.data();
   Real* centered_products = centered_squares + n_;
-  kernel.network_moments(n_, q, rbf.diagonal ? rbf.centers.data() : ones_.data(), jacobian.activation.data(),
-                         jacobian.weights.data(), squares_.data(), centered_squares, centered_products);
+  if (coupled()) {
+    kernel.network_moments(n_, q, rbf.diagonal ? rbf.centers.data() : ones_.data(), activation, jacobian.weights.data(),
+                           squares_.data(), centered_squares, centered_products);
+  } else {
+    kernel.column_products(n_, q, activation, activation, squares_.data());
+  }
   const Real factor = -2.0 / (rbf.width * rbf.width);
+  const Real gamma_beta = gamma_ * gains.beta;
   for (int p = 0; p < n_; ++p) {
     const Real s = jacobian.network[at(p)];
-    const Real r = s * jacobian.inverse_bound[at(p)];
-    const Real push = gamma_ * gains.beta * jacobian.error[at(p)];
-    inverse_a1_[at(p)] = 1.0 / (1.0 + push * r);
+    const Real theta = jacobian.inverse_bound[at(p)];
+    const Real r = s * theta;
+    const Real push = gamma_beta * jacobian.error[at(p)];
+    const Real inverse_a1 = 1.0 / (1.0 + push * r);
+    inverse_a1_[at(p)] = inverse_a1;
     inverse_a2_[at(p)] = 1.0 / (1.0 + 2.0 * push * r);
-    stiffness_[at(p)] += gamma_ * gains.beta * (squares_[at(p)] - s * r) * inverse_a2_[at(p)];
+    network_gain_[at(p)] = gamma_beta * (squares_[at(p)] - s * r) * inverse_a2_[at(p)];
+    stiffness_[at(p)] += network_gain_[at(p)];
+    activation_per_error_[at(p)] = gamma_beta * inverse_a1;
+    weight_per_error_[at(p)] = -gamma_beta * r * inverse_a1;
+    activation_share_[at(p)] = coupled() ? push * inverse_a1 : 0.0;
+    weight_per_network_[at(p)] = -push * theta * inverse_a1;
     if (!coupled()) continue;
     // dS_m = factor S_m (y.dy - c_m.dy): functional 0 is y.dy; then 1.dy for diagonal centres, c_m.dy otherwise
     const Real along_S = push * inverse_a2_[at(p)];
     const Real along_w = 1.0 - push * r * inverse_a2_[at(p)];
     sensitivity_[at(p)] = factor * (along_S * squares_[at(p)] + along_w * s);
-    weight_sensitivity_[at(p)] = factor * s;
     if (rbf.diagonal) {
       sensitivity_[at(n_ + p)] = -factor * (along_S * centered_squares[p] + along_w * centered_products[p]);
-      weight_sensitivity_[at(n_ + p)] = -factor * centered_products[p];
     } else {
       for (int m = 0; m < q; ++m) {
         const Real S = jacobian.activation[at(m * n_ + p)];
         const Real w = jacobian.weights[at(m * n_ + p)];
         sensitivity_[at((1 + m) * n_ + p)] = -factor * S * (along_S * S + along_w * w);
-        weight_sensitivity_[at((1 + m) * n_ + p)] = -factor * S * w;
       }
     }
   }
@@ -177,16 +201,16 @@ void StructuredNewton::factor_core() {
   const AlignedVector& gain = blocks_.shared_signal_gain();
   core_->clear();
   for (int p = 0; p < n_; ++p) {
-    const int i = shape.player_of(p);
+    const int i = player_[at(p)];
     const bool second = second_[at(p)] != 0;
     const Real B = stiffness_[at(p)];
+    inverse_driven_[at(p)] = 1.0 / (1.0 + gamma_ * B);
     const int driven = second ? p : first_order_[at(p)];
     const Real weight = second ? gamma_ * gamma_ : gamma_;
     const Real gradient_weight = second ? weight * B * k2 : gamma_ * k2;
     for (int k = hessian.start[at(p)]; k < hessian.start[at(p + 1)]; ++k) {
-      const int column = hessian.column[at(k)];
-      const Real T = gain[at(i * shape.players + shape.player_of(column))];
-      core_->add(p, column, gradient_weight * jacobian_->hessian[at(k)] * T);
+      const Real T = gain[at(hessian_gain_[at(k)])];
+      core_->add(p, hessian.column[at(k)], gradient_weight * jacobian_->hessian[at(k)] * T);
     }
     if (second) {
       core_->add(p, p, 1.0 + gamma_ * B);
@@ -211,7 +235,7 @@ void StructuredNewton::factor_core() {
           sensitivity += sensitivity_[at((1 + m) * n_ + p)] * rbf.centers[at(m * n_ + k)];
         }
       }
-      core_->add(driven, k, weight * sensitivity * gain[at(i * shape.players + shape.player_of(k))]);
+      core_->add(driven, k, weight * sensitivity * gain[at(i * shape.players + player_[at(k)])]);
     }
   }
 }
@@ -260,11 +284,10 @@ void StructuredNewton::solve(Real* b) {
   Real* dW = b + layout.weights();
   Real* h = network_rhs_.data();
   Real* kappa_dS = scratch_.data();
-  Real* w_dS = scratch_.data() + n_;
 
   const auto apply_hessian = [&] {
     for (int p = 0; p < n_; ++p) {
-      const Real* own = dy + shape.player_of(p) * n_;
+      const Real* own = dy + player_[at(p)] * n_;
       Real sum = 0.0;
       for (int k = hessian.start[at(p)]; k < hessian.start[at(p + 1)]; ++k) {
         sum += jacobian_->hessian[at(k)] * own[hessian.column[at(k)]];
@@ -308,9 +331,6 @@ void StructuredNewton::solve(Real* b) {
   if (coupled()) {
     accumulate_functionals(dy);
     apply_functionals(sensitivity_.data(), kappa_dS);
-    apply_functionals(weight_sensitivity_.data(), w_dS);
-  } else {
-    std::fill_n(w_dS, n_, 0.0);
   }
   for (int p = 0; p < n_; ++p) {
     dx[p] = second_[at(p)] != 0 ? shared_[at(p)] : core_rhs_[at(first_order_[at(p)])];
@@ -326,22 +346,15 @@ void StructuredNewton::solve(Real* b) {
     }
     const Real B = stiffness_[at(p)];
     dreference[p] =
-        (dreference[p] - gamma_ * (h[p] + kappa_dS[p] + B * k2 * gradient_[at(p)] - dg)) / (1.0 + gamma_ * B);
+        (dreference[p] - gamma_ * (h[p] + kappa_dS[p] + B * k2 * gradient_[at(p)] - dg)) * inverse_driven_[at(p)];
   }
   if (!robust) return;
 
-  // weights: a1 dw = b + gamma beta de (S - r w) + gamma beta e dS - gamma beta e theta w (w'dS + S'dw)
-  const Real gamma_beta = gamma_ * parameters.gains.beta;
   for (int p = 0; p < n_; ++p) {
     const Real de = second_[at(p)] != 0 ? dreference[p] + k2 * gradient_[at(p)] : dx[p] - dreference[p];
-    const Real theta = jacobian_->inverse_bound[at(p)];
-    const Real r = jacobian_->network[at(p)] * theta;
-    const Real push = gamma_beta * jacobian_->error[at(p)];
-    const Real A = gamma_beta * (squares_[at(p)] - jacobian_->network[at(p)] * r) * inverse_a2_[at(p)];
-    const Real dnetwork = h[p] + A * de + kappa_dS[p];  // S'dw + w'dS
-    from_error_[at(p)] = gamma_beta * de * inverse_a1_[at(p)];
-    from_activation_[at(p)] = coupled() ? push * inverse_a1_[at(p)] : 0.0;
-    onto_weight_[at(p)] = -(gamma_beta * de * r + push * theta * dnetwork) * inverse_a1_[at(p)];
+    const Real dnetwork = h[p] + network_gain_[at(p)] * de + kappa_dS[p];  // d(w'S) = S'dw + w'dS
+    from_error_[at(p)] = activation_per_error_[at(p)] * de;
+    onto_weight_[at(p)] = weight_per_error_[at(p)] * de + weight_per_network_[at(p)] * dnetwork;
   }
   const Real* change = jacobian_->activation.data();
   if (coupled()) {
@@ -359,7 +372,7 @@ void StructuredNewton::solve(Real* b) {
       }
     }
   }
-  kernel.weight_corrections(n_, shape.neurons, inverse_a1_.data(), from_error_.data(), from_activation_.data(),
+  kernel.weight_corrections(n_, shape.neurons, inverse_a1_.data(), from_error_.data(), activation_share_.data(),
                             onto_weight_.data(), jacobian_->activation.data(), change, jacobian_->weights.data(), dW);
 }
 
