@@ -285,10 +285,7 @@ fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte serializedSta
                                    fmi2FMUstate* FMUstate) {
   return status(guarded(c, Call::serialize_state, "fmi2DeSerializeFMUstate", [&](Component& component) {
     fmi2FMUstate& handle = required(FMUstate, "FMUstate");
-    const Instance& instance = component.instance;
-    store(
-        component, handle,
-        from_bytes(array(serializedState, size, "serializedState"), instance.model().guid, instance.snapshot_shape()));
+    store(component, handle, component.instance.read(array(serializedState, size, "serializedState")));
   }));
 }
 

@@ -58,7 +58,9 @@ Standing Instance::standing() const {
   return {.time = experiment_.start_time, .state = initial_state_.data(), .modes = &initial_modes_, .statistics = {}};
 }
 
-void Instance::setup_experiment(const Experiment& experiment) {
+namespace {
+
+void require_valid(const Experiment& experiment) {
   if (!std::isfinite(experiment.start_time)) {
     throw Error("the start time is " + text_of(experiment.start_time) + ", expected a finite number");
   }
@@ -70,6 +72,12 @@ void Instance::setup_experiment(const Experiment& experiment) {
     throw Error("the stop time is " + text_of(*experiment.stop_time) + ", expected a finite number of at least " +
                 text_of(experiment.start_time) + ", the start time");
   }
+}
+
+}  // namespace
+
+void Instance::setup_experiment(const Experiment& experiment) {
+  require_valid(experiment);
   experiment_ = experiment;
   evaluation_.moved();
 }
@@ -442,6 +450,14 @@ SnapshotShape Instance::snapshot_shape() const {
           .states = initial_state_.size(),
           .modes = initial_modes_.size(),
           .steps = Integrator::most_steps_between_restarts(static_cast<int>(initial_state_.size()))};
+}
+
+Snapshot Instance::read(std::span<const char> bytes) const {
+  Snapshot snapshot = from_bytes(bytes, model_.guid, snapshot_shape());
+  require_valid(snapshot.experiment);
+  model_.variables.require_settable(snapshot.settings);
+  if (snapshot.co_simulation) model_.variables.require_settable(snapshot.co_simulation->acting);
+  return snapshot;
 }
 
 bool Instance::restore(const Snapshot& snapshot) {

@@ -76,6 +76,8 @@ class Instance {
   void get_nominals(std::span<Real> nominals) const;
 
   [[nodiscard]] Snapshot save() const;
+  /// A state that to_bytes() wrote; anything else, and settings that could not have been set, are refused.
+  [[nodiscard]] Snapshot read(std::span<const char> bytes) const;
   /// False when this machine's arithmetic does not repeat the steps that led to the saved state bit for bit; the run
   /// then goes on from that state with a restart of the integrator.
   bool restore(const Snapshot& snapshot);

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "errors.hpp"
 #include "measures.hpp"
 
 namespace mixed_order_game {
@@ -711,6 +712,15 @@ void ModelVariables::load(std::span<const Real> numbers, Settings& settings) con
   }
   settings.input.set_numbers(numbers.subspan(settable_.size()));
   settings.parameters.refresh();
+}
+
+void ModelVariables::require_settable(std::span<const Real> numbers) const {
+  for (std::size_t k = 0; k < settable_.size(); ++k) {
+    const Range range = family(settable_[k]).range;
+    if (contains(range, numbers[k])) continue;
+    throw Error("the saved " + name(settable_[k]) + " is " + text_of(numbers[k]) + ", expected " +
+                std::string(expectation(range)));
+  }
 }
 
 }  // namespace mixed_order_game

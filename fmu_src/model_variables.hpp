@@ -107,6 +107,8 @@ class ModelVariables {
   /// All settings as numbers, in the order of the table, followed by the input polynomials.
   [[nodiscard]] std::vector<Real> save(const Settings& settings) const;
   void load(std::span<const Real> numbers, Settings& settings) const;
+  /// Refuses saved numbers that could not have been set.
+  void require_settable(std::span<const Real> numbers) const;
   [[nodiscard]] std::size_t saved_size() const { return settable_.size() + input_numbers_; }
   /// How many of the saved numbers come before the input polynomials.
   [[nodiscard]] std::size_t saved_parameters() const { return settable_.size(); }

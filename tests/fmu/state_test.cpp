@@ -239,6 +239,30 @@ TEST(Behaviour04Serialization, TooManyStepsToRepeatAreRefused) {
   EXPECT_EQ(slave.step(1.0, 0.1), fmi2OK);
 }
 
+TEST(Behaviour04Serialization, SettingsThatCannotBeSetAreRefused) {
+  Slave slave;
+  slave.initialize();
+  slave.run(0.0, 1.0, 4);
+  const Instance instance(slave.model(), Interface::co_simulation);
+  const Snapshot good = from_bytes(slave.serialized(), slave.model().guid, instance.snapshot_shape());
+  const auto before = slave.all();
+  const auto refused = [&](const Snapshot& snapshot, const char* reason) {
+    EXPECT_EQ(slave.deserialize_and_set(to_bytes(snapshot, slave.model().guid)), fmi2Error) << reason;
+    EXPECT_NE(slave.last_message().find(reason), std::string::npos) << slave.last_message();
+    EXPECT_TRUE(same_values(slave, slave.all(), before));
+  };
+  ASSERT_EQ(good.settings[2], 20.0) << "k3";
+  for (const bool acting : {false, true}) {
+    Snapshot snapshot = good;
+    (acting ? snapshot.co_simulation->acting : snapshot.settings)[2] = -3.0;
+    refused(snapshot, "the saved k3 is -3, expected a positive finite number");
+  }
+  Snapshot snapshot = good;
+  snapshot.experiment.tolerance = -1e-3;
+  refused(snapshot, "the tolerance is -0.001");
+  EXPECT_EQ(slave.deserialize_and_set(to_bytes(good, slave.model().guid)), fmi2OK);
+}
+
 TEST(Behaviour04Serialization, AnotherModelsBytesAreRefused) {
   Slave slave;
   slave.initialize();
