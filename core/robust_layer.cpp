@@ -21,13 +21,12 @@ bool RobustLayer::linearization_holds(const LoopJacobian& jacobian, const Signal
   const int columns = loop_.shape().actions();
   // A difference in phi moves the solution by its share gamma / (1 + gamma slope).
   const auto within_tolerance = [&](auto difference, auto slope) {
-    Real sum = 0.0;
+    Real largest = 0.0;
     for (int p = 0; p < columns; ++p) {
       const Real share = gamma / (1.0 + gamma * std::min(slope(at(p)), jacobian.slope[at(p)]));
-      const Real weighted = share * difference(at(p)) * weight[place_of(p)];
-      sum += weighted * weighted;
+      largest = std::max(largest, share * std::fabs(difference(at(p))) * weight[place_of(p)]);
     }
-    return sum <= tolerance * tolerance;
+    return largest <= tolerance;
   };
   loop_.evaluate_errors(state, trial_);
   const auto change = [&](std::size_t p) { return trial_.error[p] - signals.error[p]; };

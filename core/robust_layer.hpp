@@ -14,7 +14,7 @@ class RobustLayer {
   explicit RobustLayer(const ClosedLoop& loop);
 
   /// Whether phi at this state is what the linearization foretells: gamma times the differences, as far as the solution
-  /// follows them, weighted like the rates that they enter, up to the tolerance in the 2-norm. Signals belong to the
+  /// follows them, weighted like the rates that they enter, up to the tolerance in each column. Signals belong to the
   /// state that the last correction set out from, slopes to the factorized Jacobian. A solution follows a difference by
   /// 1 / (1 + gamma slope) of it, with the lesser of the slopes foretold and found.
   [[nodiscard]] bool linearization_holds(const LoopJacobian& jacobian, const Signals& signals, const Real* state,

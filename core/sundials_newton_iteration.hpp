@@ -22,7 +22,7 @@ class NewtonSystem {
   /// Replaces b by (I - gamma J)^-1 b with gamma and J of the last factorization.
   virtual int solve(Real* b) noexcept = 0;
   /// Whether the rates at this state, times gamma, are those that the factorized matrix foretells from the state of
-  /// the last evaluation, up to the tolerance in the weighted norm.
+  /// the last evaluation, weighted and up to the tolerance in each entry.
   virtual bool linearization_holds(const Real* state, Real gamma, const Real* weight, Real tolerance) noexcept = 0;
   /// Moves the predicted state, from which an iteration failed with this last iterate, to where one that factorizes
   /// at each iterate will converge; false when it knows of no such place.
