@@ -46,7 +46,7 @@ def test_installed_command(fmu: Path) -> None:
     assert "6 samples" in done.stdout
     bad = subprocess.run([*command, "--set", "k1=-1"], capture_output=True, text=True, check=False)
     assert bad.returncode == 1
-    assert bad.stderr.startswith("mog: k1 = -1 ")
+    assert bad.stderr.startswith("mog: k1 is -1, expected")
     assert bad.stderr.count("\n") == 1
     wrong = subprocess.run([*command, "--nonsense"], capture_output=True, text=True, check=False)
     assert wrong.returncode == 2
