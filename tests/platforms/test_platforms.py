@@ -23,8 +23,10 @@ CHOSEN = os.environ.get("MIXED_ORDER_GAME_PLATFORMS")
 FOLDER = Path(CHOSEN) if CHOSEN else ROOT / "build" / "platforms"
 
 PERMITTED = 1e-4
-"""Largest difference of an action between platforms: a few times the error of a run at the default tolerance,
-because the C libraries' functions pow, by which CVODE chooses its steps, differ in a last digit now and then."""
+"""Largest difference of an action between platforms: a few times the error of a run at the default tolerance.
+
+The C libraries' functions pow, by which CVODE chooses its steps, differ in a last digit now and then."""
+
 
 built = pytest.mark.skipif(
     CHOSEN is None and not (FOLDER / "report.json").is_file(), reason="./dev fmu-all has not been run"
