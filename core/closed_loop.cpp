@@ -49,23 +49,26 @@ void ClosedLoop::evaluate_robust_term(Signals& signals) const {
                         signals.error.data(), signals.robust.data());
 }
 
-void ClosedLoop::evaluate_seeking(const Real* state, Signals& signals) const {
+void ClosedLoop::evaluate_network(const Real* state, Signals& signals) const {
   const Kernels& kernel = kernels();
-  const auto& [shape, gains, strategy, rbf, graph, cost, dynamics, disturbance, initial] = parameters_;
-  const int n = shape.actions();
-
-  evaluate_errors(state, signals);
-  if (!strategy.robust) {  // the estimation module is absent
-    std::fill_n(signals.network.begin(), n, 0.0);
-    std::fill_n(signals.robust.begin(), n, 0.0);
-    return;
-  }
+  const RbfNetwork& rbf = parameters_.rbf;
+  const Shape& shape = parameters_.shape;
   const auto activations = rbf.diagonal ? kernel.activations_diagonal : kernel.activations_general;
   activations(shape.players, shape.dimension, shape.neurons, rbf.centers.data(), rbf.width, state + layout_.estimates(),
               signals.exponent.data(), signals.activation.data());
-  kernel.column_products(n, shape.neurons, state + layout_.weights(), signals.activation.data(),
+  kernel.column_products(shape.actions(), shape.neurons, state + layout_.weights(), signals.activation.data(),
                          signals.network.data());
-  evaluate_robust_term(signals);
+}
+
+void ClosedLoop::evaluate_seeking(const Real* state, Signals& signals) const {
+  evaluate_errors(state, signals);
+  if (parameters_.strategy.robust) {
+    evaluate_network(state, signals);
+    evaluate_robust_term(signals);
+  } else {  // the estimation module is absent
+    std::fill(signals.network.begin(), signals.network.end(), 0.0);
+    std::fill(signals.robust.begin(), signals.robust.end(), 0.0);
+  }
 }
 
 void ClosedLoop::evaluate(Real t, const Real* state, const Real* d_ext, const Modes& modes, Signals& signals,
@@ -138,7 +141,10 @@ void ClosedLoop::event_functions(const Real* state, const Modes& modes, Signals&
     return;
   }
   weight_norms(state, values);
-  if (std::any_of(modes.begin(), modes.end(), [](auto mode) { return mode != 0; })) evaluate_seeking(state, signals);
+  if (std::any_of(modes.begin(), modes.end(), [](auto mode) { return mode != 0; })) {
+    evaluate_errors(state, signals);
+    evaluate_network(state, signals);
+  }
   for (std::size_t p = 0; p < modes.size(); ++p) {
     const Real value =
         modes[p] != 0 ? -signals.error[p] * signals.network[p] : values[p] / parameters_.rbf.W_max - 1.0 - hysteresis;

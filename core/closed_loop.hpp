@@ -32,6 +32,9 @@ class ClosedLoop {
   /// The first of the signals: xbar, gradient and error.
   void evaluate_errors(const Real* state, Signals& signals) const;
 
+  /// Activations and network.
+  void evaluate_network(const Real* state, Signals& signals) const;
+
   /// phi of the signals' errors.
   void evaluate_robust_term(Signals& signals) const;
 
@@ -58,7 +61,7 @@ class ClosedLoop {
 
   /// One event function for each column, at entry(i, l), which rises through zero where the column's mode ends: inside,
   /// w'w / W_max - 1 (less a hysteresis of rounding size, so that a column that has just left the sphere is not seen to
-  /// return); on the sphere, -e w'S. Never exactly zero. Evaluates the seeking signals when a column is on the sphere.
+  /// return); on the sphere, -e w'S. Never exactly zero. Evaluates errors and network when a column is on the sphere.
   void event_functions(const Real* state, const Modes& modes, Signals& signals, Real* values) const;
 
   /// Puts the state where the modes say it is: columns on the sphere are scaled to w'w = W_max, and columns inside

@@ -17,12 +17,17 @@ class DenseCore final : public CoreSystem {
  public:
   explicit DenseCore(int unknowns) : unknowns_(unknowns), matrix_(at(unknowns) * at(unknowns)), pivot_(at(unknowns)) {}
 
-  void clear() override { std::fill(matrix_.begin(), matrix_.end(), 0.0); }
-  void add(int row, int column, Real value) override { matrix_[at(column * unknowns_ + row)] += value; }
+  void clear() override {
+    std::fill(matrix_.begin(), matrix_.end(), 0.0);
+    begin_sequence();
+  }
   bool factor() override { return kernels().lu_factor(unknowns_, matrix_.data(), pivot_.data()); }
+  [[nodiscard]] int place(int unknown) const override { return unknown; }
   void solve(Real* b) override { kernels().lu_solve(unknowns_, matrix_.data(), pivot_.data(), b); }
 
  private:
+  Real* entry(int row, int column) override { return &matrix_[at(column * unknowns_ + row)]; }
+
   int unknowns_;
   AlignedVector matrix_;
   std::vector<int> pivot_;
@@ -36,13 +41,15 @@ class SparseCore final : public CoreSystem {
 
   void clear() override {
     std::fill(value_.begin(), value_.end(), 0.0);
-    next_slot_ = 0;
+    begin_sequence();
   }
-  void add(int row, int column, Real value) override;
   bool factor() override;
+  [[nodiscard]] int place(int unknown) const override { return position_[at(unknown)]; }
   void solve(Real* b) override;
 
  private:
+  Real* entry(int row, int column) override;
+
   int unknowns_;
   std::vector<int> position_;  // of an unknown in the order of elimination
   // the rows of L (unit diagonal) and U together, in the order of elimination, columns ascending
@@ -52,9 +59,6 @@ class SparseCore final : public CoreSystem {
   AlignedVector value_;
   AlignedVector inverse_pivot_;
   AlignedVector row_;
-  // entries are always added in the same sequence: where each one goes is looked up once
-  std::vector<int> slots_;
-  std::size_t next_slot_ = 0;
 };
 
 SparseCore::SparseCore(const std::vector<std::vector<int>>& rows)
@@ -93,14 +97,11 @@ SparseCore::SparseCore(const std::vector<std::vector<int>>& rows)
   value_.resize(column_.size());
 }
 
-void SparseCore::add(int row, int column, Real value) {
-  if (next_slot_ == slots_.size()) {
-    const int i = position_[at(row)];
-    const auto first = column_.begin() + start_[at(i)];
-    const auto last = column_.begin() + start_[at(i + 1)];
-    slots_.push_back(static_cast<int>(std::lower_bound(first, last, position_[at(column)]) - column_.begin()));
-  }
-  value_[at(slots_[next_slot_++])] += value;
+Real* SparseCore::entry(int row, int column) {
+  const int i = position_[at(row)];
+  const auto first = column_.begin() + start_[at(i)];
+  const auto last = column_.begin() + start_[at(i + 1)];
+  return &value_[at(std::lower_bound(first, last, position_[at(column)]) - column_.begin())];
 }
 
 bool SparseCore::factor() {
@@ -128,18 +129,16 @@ bool SparseCore::factor() {
 }
 
 void SparseCore::solve(Real* b) {
-  for (int row = 0; row < unknowns_; ++row) row_[at(position_[at(row)])] = b[row];
   for (int i = 0; i < unknowns_; ++i) {
-    Real sum = row_[at(i)];
-    for (int e = start_[at(i)]; e < diagonal_[at(i)]; ++e) sum -= value_[at(e)] * row_[at(column_[at(e)])];
-    row_[at(i)] = sum;
+    Real sum = b[i];
+    for (int e = start_[at(i)]; e < diagonal_[at(i)]; ++e) sum -= value_[at(e)] * b[column_[at(e)]];
+    b[i] = sum;
   }
   for (int i = unknowns_ - 1; i >= 0; --i) {
-    Real sum = row_[at(i)];
-    for (int e = diagonal_[at(i)] + 1; e < start_[at(i + 1)]; ++e) sum -= value_[at(e)] * row_[at(column_[at(e)])];
-    row_[at(i)] = sum * inverse_pivot_[at(i)];
+    Real sum = b[i];
+    for (int e = diagonal_[at(i)] + 1; e < start_[at(i + 1)]; ++e) sum -= value_[at(e)] * b[column_[at(e)]];
+    b[i] = sum * inverse_pivot_[at(i)];
   }
-  for (int row = 0; row < unknowns_; ++row) b[row] = row_[at(position_[at(row)])];
 }
 
 }  // namespace

@@ -1,5 +1,6 @@
 #include "estimate_blocks.hpp"
 
+#include <Eigen/Eigenvalues>
 #include <Eigen/OrderingMethods>
 #include <Eigen/SparseCore>
 #include <algorithm>
@@ -7,8 +8,45 @@
 
 namespace mixed_order_game {
 
-void EstimateBlocks::analyse(const CommunicationGraph& graph) {
+void EstimateBlocks::analyse(const CommunicationGraph& graph, int dimension) {
   players_ = graph.players();
+  dimension_ = dimension;
+  gain_.resize(at(players_) * at(players_));
+  if (by_modes()) {
+    find_modes(graph);
+  } else {
+    find_pattern(graph);
+  }
+}
+
+void EstimateBlocks::find_modes(const CommunicationGraph& graph) {
+  const int N = players_;
+  const int n = N * dimension_;
+  vector_.resize(at(N) * at(N) * at(n));
+  for (AlignedVector* rows : {&eigenvalue_, &shared_, &inverse_}) rows->resize(at(N) * at(n));
+  Eigen::MatrixXd laplacian = Eigen::MatrixXd::Zero(N, N);
+  for (const auto& [i, k] : graph.edges()) {
+    laplacian(i, k) = laplacian(k, i) = -graph.weight(i, k);
+    laplacian(i, i) += graph.weight(i, k);
+    laplacian(k, k) += graph.weight(i, k);
+  }
+  for (int j = 0; j < N; ++j) {
+    Eigen::VectorXd seen(N);  // a_.j
+    for (int i = 0; i < N; ++i) seen(i) = graph.weight(i, j);
+    const Eigen::MatrixXd block = laplacian + Eigen::MatrixXd(seen.asDiagonal());
+    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(block);
+    const Eigen::VectorXd shared = solver.eigenvectors().transpose() * seen;
+    for (int p = j; p < n; p += N) {
+      for (int k = 0; k < N; ++k) {
+        eigenvalue_[at(k * n + p)] = solver.eigenvalues()(k);
+        shared_[at(k * n + p)] = shared(k);
+        for (int i = 0; i < N; ++i) vector_[at((k * N + i) * n + p)] = solver.eigenvectors()(i, k);
+      }
+    }
+  }
+}
+
+void EstimateBlocks::find_pattern(const CommunicationGraph& graph) {
   const int n = players_;
   std::vector<Eigen::Triplet<double, int>> entries;
   for (int i = 0; i < n; ++i) entries.emplace_back(i, i, 1.0);
@@ -50,10 +88,13 @@ void EstimateBlocks::analyse(const CommunicationGraph& graph) {
   }
   lower_.resize(row_.size() * at(n));
   diagonal_.resize(at(n) * at(n));
-  gain_.resize(at(n) * at(n));
 }
 
 void EstimateBlocks::factor(const CommunicationGraph& graph, Real gamma_k3) {
+  if (by_modes()) {
+    kernels().factor_modes(modes(), gamma_k3, inverse_.data(), gain_.data());
+    return;
+  }
   const int n = players_;
   const NeighbourRows rows = graph.neighbours();
   std::fill(gain_.begin(), gain_.end(), 0.0);
@@ -74,11 +115,15 @@ void EstimateBlocks::factor(const CommunicationGraph& graph, Real gamma_k3) {
   }
   kernels().factor_blocks(pattern(), lower_.data(), diagonal_.data());
   for (Real& d : diagonal_) d = 1.0 / d;
-  solve(1, gain_.data());
+  kernels().solve_blocks(pattern(), 1, lower_.data(), diagonal_.data(), gain_.data());
 }
 
-void EstimateBlocks::solve(int dimension, Real* rows) const {
-  kernels().solve_blocks(pattern(), dimension, lower_.data(), diagonal_.data(), rows);
+void EstimateBlocks::solve(Real* rows) const {
+  if (by_modes()) {
+    kernels().solve_modes(modes(), inverse_.data(), rows);
+  } else {
+    kernels().solve_blocks(pattern(), dimension_, lower_.data(), diagonal_.data(), rows);
+  }
 }
 
 }  // namespace mixed_order_game

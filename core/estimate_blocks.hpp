@@ -2,7 +2,8 @@
 //
 // The consensus law couples y_ij only with y_kj of the same j and coordinate, so I - gamma J splits into the N matrices
 // B_j = I + gamma k3 (L + diag(a_.j)), each used for every coordinate. All have the pattern of the graph: one symbolic
-// analysis (minimum degree), and a numeric L D L' that treats the N blocks side by side.
+// analysis (minimum degree), and a numeric L D L' that treats the N blocks side by side. For few players it is faster
+// to have the eigenvectors of all L + diag(a_.j), which no gamma changes: factorizing is then a division for each.
 #pragma once
 
 #include <vector>
@@ -14,31 +15,44 @@ namespace mixed_order_game {
 
 class EstimateBlocks {
  public:
-  /// Symbolic analysis; needed again when an edge appeared or vanished, and harmless otherwise.
-  void analyse(const CommunicationGraph& graph);
+  /// Symbolic analysis, or eigenvectors; needed again when the graph has changed.
+  void analyse(const CommunicationGraph& graph, int dimension);
 
   /// Numeric factors for gamma k3 > 0.
   void factor(const CommunicationGraph& graph, Real gamma_k3);
 
   /// Solves for rows y_i of dimension * N entries, in place.
-  void solve(int dimension, Real* rows) const;
+  void solve(Real* rows) const;
 
   /// gain[i * N + j] = d y_ij / d xbar_j when everything else is eliminated: column j is gamma k3 B_j^-1 a_.j.
   [[nodiscard]] const AlignedVector& shared_signal_gain() const { return gain_; }
 
  private:
+  [[nodiscard]] bool by_modes() const { return players_ <= most_players_by_modes; }
+  void find_pattern(const CommunicationGraph& graph);
+  void find_modes(const CommunicationGraph& graph);
   [[nodiscard]] BlockPattern pattern() const {
     return {players_, start_.data(), row_.data(), order_.data(), target_.data()};
   }
+  [[nodiscard]] BlockModes modes() const {
+    return {players_, dimension_ * players_, vector_.data(), eigenvalue_.data(), shared_.data()};
+  }
 
   int players_ = 0;
+  int dimension_ = 0;
+  AlignedVector gain_;
+  // by elimination
   std::vector<int> start_;
   std::vector<int> row_;
   std::vector<int> order_;
   std::vector<int> target_;
   AlignedVector lower_;
   AlignedVector diagonal_;
-  AlignedVector gain_;
+  // by modes
+  AlignedVector vector_;
+  AlignedVector eigenvalue_;
+  AlignedVector shared_;
+  AlignedVector inverse_;
 };
 
 }  // namespace mixed_order_game

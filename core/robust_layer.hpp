@@ -27,10 +27,8 @@ class RobustLayer {
   bool move_to_middle(const Signals& signals, const Real* failed, Real* predicted);
 
  private:
-  /// Where the state holds the number that column p's error follows one to one.
-  [[nodiscard]] int place_of(int p) const;
-
   const ClosedLoop& loop_;
+  std::vector<int> place_;  // per column: where the state holds the number that its error follows one to one
   Signals trial_;
   AlignedVector failed_;  // phi
 };

@@ -30,6 +30,7 @@ class StructuredNewton final : public NewtonSolver {
  private:
   void factor_weights();
   void factor_core();
+  void apply_hessian(const std::vector<int>& rows, const Real* dy);
   void accumulate_functionals(const Real* dy);
   void apply_functionals(const Real* functionals, Real* product) const;
 
@@ -48,8 +49,13 @@ class StructuredNewton final : public NewtonSolver {
   int functional_count_ = 0;          // K: how many numbers the activations of one player depend on
   std::vector<int> player_;           // per entry
   std::vector<std::uint8_t> second_;  // per entry: order 2
-  std::vector<int> first_order_;      // per entry: number of dx in the core system, -1 for order 2
-  std::vector<int> hessian_gain_;     // per entry of the Hessian rows: where its dy_i / dxbar lies
+  std::vector<int> velocity_driven_;  // entries of order 1
+  std::vector<int> accelerated_;      // entries of order 2
+  std::vector<int> all_;
+  std::vector<int> first_order_;   // per entry: number of dx in the core system, -1 for order 2
+  std::vector<int> shared_place_;  // per entry: place of dxbar in the core system
+  std::vector<int> action_place_;  // per entry: place of dx
+  std::vector<int> hessian_gain_;  // per entry of the Hessian rows: where its dy_i / dxbar lies
 
   // weights; all per column p
   AlignedVector stiffness_;       // k1 or k4, plus d phi/d e, plus A
@@ -61,6 +67,7 @@ class StructuredNewton final : public NewtonSolver {
   // a1 dw = b + gamma beta (S - r w) de + gamma beta e (dS - theta w d(w'S))
   AlignedVector activation_per_error_, weight_per_error_, activation_share_, weight_per_network_;
   AlignedVector scratch_;      // 2 n
+  AlignedVector kappa_dS_;     // zero unless coupled
   AlignedVector sensitivity_;  // kappa'dS = sum_k sensitivity[k * n + p] functional[k * n + p]
   AlignedVector ones_;
 
@@ -70,7 +77,7 @@ class StructuredNewton final : public NewtonSolver {
   AlignedVector core_rhs_;
   AlignedVector shared_;    // dxbar
   AlignedVector gradient_;  // Hessian rows times dy
-  AlignedVector from_error_, onto_weight_;
+  AlignedVector error_change_, from_error_, onto_weight_;
   AlignedVector activation_change_;
 };
 
@@ -79,22 +86,26 @@ void StructuredNewton::refresh(const LoopJacobian& jacobian) {
   const Parameters& parameters = loop().parameters();
   const Shape& shape = parameters.shape;
   n_ = shape.actions();
-  blocks_.analyse(parameters.graph);
+  blocks_.analyse(parameters.graph, shape.dimension);
   functional_count_ = parameters.rbf.diagonal ? 2 : 1 + shape.neurons;
   player_.resize(at(n_));
   second_.resize(at(n_));
   first_order_.resize(at(n_));
+  for (std::vector<int>* entries : {&velocity_driven_, &accelerated_, &all_}) entries->clear();
   int unknowns = n_;
   for (int p = 0; p < n_; ++p) {
     player_[at(p)] = shape.player_of(p);
     second_[at(p)] = shape.is_second_order(shape.player_of(p)) ? 1 : 0;
     first_order_[at(p)] = second_[at(p)] != 0 ? -1 : unknowns++;
+    all_.push_back(p);
+    (second_[at(p)] != 0 ? accelerated_ : velocity_driven_).push_back(p);
   }
   const std::size_t n = at(n_);
   const std::size_t weights = n * at(shape.neurons);
-  for (AlignedVector* vector : {&stiffness_, &inverse_driven_, &inverse_a2_, &inverse_a1_, &squares_, &network_gain_,
-                                &activation_per_error_, &weight_per_error_, &activation_share_, &weight_per_network_,
-                                &network_rhs_, &shared_, &gradient_, &from_error_, &onto_weight_}) {
+  for (AlignedVector* vector :
+       {&stiffness_, &inverse_driven_, &inverse_a2_, &inverse_a1_, &squares_, &network_gain_, &activation_per_error_,
+        &weight_per_error_, &activation_share_, &weight_per_network_, &network_rhs_, &shared_, &gradient_,
+        &error_change_, &from_error_, &onto_weight_, &kappa_dS_}) {
     vector->assign(n, 0.0);
   }
   ones_.assign(at(std::max(n_, shape.neurons)), 1.0);
@@ -127,6 +138,12 @@ void StructuredNewton::refresh(const LoopJacobian& jacobian) {
     }
   }
   core_ = coupled() ? make_dense_core(unknowns) : make_sparse_core(rows);
+  shared_place_.resize(at(n_));
+  action_place_.resize(at(n_));
+  for (int p = 0; p < n_; ++p) {
+    shared_place_[at(p)] = core_->place(p);
+    action_place_[at(p)] = core_->place(second_[at(p)] != 0 ? p : first_order_[at(p)]);
+  }
 }
 
 // Column p, with r = w'S / W_max on the sphere and 0 inside, theta = 1 / W_max or 0:
@@ -269,6 +286,19 @@ void StructuredNewton::apply_functionals(const Real* sensitivity, Real* product)
   kernels().column_products(n_, functional_count_, sensitivity, functionals_.data(), product);
 }
 
+/// Rows of the cost's Hessian times dy: changes of the gradients.
+void StructuredNewton::apply_hessian(const std::vector<int>& rows, const Real* dy) {
+  const SparseRows& hessian = loop().parameters().cost->hessian_pattern();
+  for (const int p : rows) {
+    const Real* own = dy + player_[at(p)] * n_;
+    Real sum = 0.0;
+    for (int k = hessian.start[at(p)]; k < hessian.start[at(p + 1)]; ++k) {
+      sum += jacobian_->hessian[at(k)] * own[hessian.column[at(k)]];
+    }
+    gradient_[at(p)] = sum;
+  }
+}
+
 void StructuredNewton::solve(Real* b) {
   const Kernels& kernel = kernels();
   const Parameters& parameters = loop().parameters();
@@ -276,31 +306,17 @@ void StructuredNewton::solve(Real* b) {
   const StateLayout& layout = loop().layout();
   const bool robust = parameters.strategy.robust;
   const Real k2 = parameters.gains.k2;
-  const SparseRows& hessian = parameters.cost->hessian_pattern();
   const SparseRows& dynamics = parameters.dynamics->jacobian_pattern();
   Real* dx = b + layout.x();
   Real* dreference = b + layout.reference();
   Real* dy = b + layout.estimates();
   Real* dW = b + layout.weights();
   Real* h = network_rhs_.data();
-  Real* kappa_dS = scratch_.data();
-
-  const auto apply_hessian = [&] {
-    for (int p = 0; p < n_; ++p) {
-      const Real* own = dy + player_[at(p)] * n_;
-      Real sum = 0.0;
-      for (int k = hessian.start[at(p)]; k < hessian.start[at(p + 1)]; ++k) {
-        sum += jacobian_->hessian[at(k)] * own[hessian.column[at(k)]];
-      }
-      gradient_[at(p)] = sum;
-    }
-  };
+  Real* kappa_dS = kappa_dS_.data();
 
   // estimates and weights without the unknowns of the core
-  blocks_.solve(shape.dimension, dy);
-  apply_hessian();
-  std::fill_n(h, n_, 0.0);
-  std::fill_n(kappa_dS, n_, 0.0);
+  blocks_.solve(dy);
+  apply_hessian(all_, dy);
   if (robust) {
     kernel.column_products(n_, shape.neurons, jacobian_->activation.data(), dW, h);
     for (int p = 0; p < n_; ++p) h[p] *= inverse_a2_[at(p)];
@@ -308,55 +324,55 @@ void StructuredNewton::solve(Real* b) {
       accumulate_functionals(dy);
       apply_functionals(sensitivity_.data(), kappa_dS);
     }
+  } else {
+    std::fill_n(h, n_, 0.0);
   }
 
   // core
-  for (int p = 0; p < n_; ++p) {
-    const Real known = h[p] + kappa_dS[p];
+  for (const int p : velocity_driven_) {
+    core_rhs_[at(shared_place_[at(p)])] = dreference[p] - gamma_ * k2 * gradient_[at(p)];
+    core_rhs_[at(action_place_[at(p)])] = dx[p] - gamma_ * (h[p] + kappa_dS[p]);
+  }
+  for (const int p : accelerated_) {
     const Real B = stiffness_[at(p)];
-    if (second_[at(p)] != 0) {
-      core_rhs_[at(p)] =
-          (1.0 + gamma_ * B) * dx[p] + gamma_ * (dreference[p] - gamma_ * (known + B * k2 * gradient_[at(p)]));
-    } else {
-      core_rhs_[at(p)] = dreference[p] - gamma_ * k2 * gradient_[at(p)];
-      core_rhs_[at(first_order_[at(p)])] = dx[p] - gamma_ * known;
-    }
+    const Real known = h[p] + kappa_dS[p] + B * k2 * gradient_[at(p)];
+    core_rhs_[at(shared_place_[at(p)])] = (1.0 + gamma_ * B) * dx[p] + gamma_ * (dreference[p] - gamma_ * known);
   }
   core_->solve(core_rhs_.data());
-  std::copy_n(core_rhs_.begin(), n_, shared_.begin());
 
   // back to estimates, actions, references and velocities
+  for (int p = 0; p < n_; ++p) {
+    shared_[at(p)] = core_rhs_[at(shared_place_[at(p)])];
+    dx[p] = core_rhs_[at(action_place_[at(p)])];
+  }
   kernel.add_shared_signal(shape.players, shape.dimension, blocks_.shared_signal_gain().data(), shared_.data(), dy);
-  apply_hessian();
   if (coupled()) {
     accumulate_functionals(dy);
     apply_functionals(sensitivity_.data(), kappa_dS);
   }
-  for (int p = 0; p < n_; ++p) {
-    dx[p] = second_[at(p)] != 0 ? shared_[at(p)] : core_rhs_[at(first_order_[at(p)])];
+  for (const int p : velocity_driven_) {
+    dreference[p] = shared_[at(p)];
+    error_change_[at(p)] = dx[p] - dreference[p];
   }
-  for (int p = 0; p < n_; ++p) {
-    if (second_[at(p)] == 0) {
-      dreference[p] = shared_[at(p)];
-      continue;
-    }
+  apply_hessian(accelerated_, dy);
+  for (const int p : accelerated_) {
     Real dg = 0.0;
     for (int k = dynamics.start[at(p)]; k < dynamics.start[at(p + 1)]; ++k) {
       dg += jacobian_->dynamics[at(k)] * dx[dynamics.column[at(k)]];
     }
-    const Real B = stiffness_[at(p)];
-    dreference[p] =
-        (dreference[p] - gamma_ * (h[p] + kappa_dS[p] + B * k2 * gradient_[at(p)] - dg)) * inverse_driven_[at(p)];
+    const Real push = h[p] + kappa_dS[p] + stiffness_[at(p)] * k2 * gradient_[at(p)] - dg;
+    dreference[p] = (dreference[p] - gamma_ * push) * inverse_driven_[at(p)];
+    error_change_[at(p)] = dreference[p] + k2 * gradient_[at(p)];
   }
   if (!robust) return;
 
   for (int p = 0; p < n_; ++p) {
-    const Real de = second_[at(p)] != 0 ? dreference[p] + k2 * gradient_[at(p)] : dx[p] - dreference[p];
+    const Real de = error_change_[at(p)];
     const Real dnetwork = h[p] + network_gain_[at(p)] * de + kappa_dS[p];  // d(w'S) = S'dw + w'dS
     from_error_[at(p)] = activation_per_error_[at(p)] * de;
     onto_weight_[at(p)] = weight_per_error_[at(p)] * de + weight_per_network_[at(p)] * dnetwork;
   }
-  const Real* change = jacobian_->activation.data();
+  const Real* change = nullptr;
   if (coupled()) {
     change = activation_change_.data();
     const RbfNetwork& rbf = parameters.rbf;

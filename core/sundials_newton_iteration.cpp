@@ -129,10 +129,10 @@ int NewtonIteration::iterate(Real* correction, const Real* weight, Real toleranc
     ++last_iterations_;
     kernel.newton_residual(n, gamma, f, rl1, zn1, correction, delta_.data());
     if (const int result = system_.solve(delta_.data()); result != 0) return result < 0 ? CV_LSOLVE_FAIL : result;
-    const Real squares = kernel.add_correction(n, scale, delta_.data(), weight, correction);
-    const Real size = std::sqrt(squares / static_cast<Real>(n));
+    const Real squares = kernel.weighted_square_sum(n, delta_.data(), weight);
+    const Real size = scale * std::sqrt(squares / static_cast<Real>(n));
+    kernel.add_correction(n, scale, delta_.data(), predicted, correction, y);
     if (number > 0) convergence_rate_ = std::max(0.3 * convergence_rate_, size / last_size);
-    kernel.linear_sum(n, 1.0, predicted, 1.0, correction, y);
     const bool converged = size * std::min(1.0, convergence_rate_) <= tolerance;
     if (converged && system_.linearization_holds(y, gamma, weight, tolerance)) return 0;
     const bool diverges = !carefully && number > 0 && size > 2.0 * last_size;

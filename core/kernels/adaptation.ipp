@@ -1,38 +1,51 @@
 // Adaptation of the weights, W' = beta e (S - radial W), and the sums w'S and w'w; part of level.cpp.
 
-void column_products(int n, int rows, const double* __restrict a, const double* __restrict b, double* __restrict sum) {
-  for (int p = 0; p < n; ++p) sum[p] = 0.0;
-  for (int m = 0; m < rows; ++m) {
-    const double* __restrict am = a + m * n;
-    const double* __restrict bm = b + m * n;
-    for (int p = 0; p < n; ++p) sum[p] += am[p] * bm[p];
-  }
+void column_products(int n, int rows, const double* a, const double* b, double* sum) {
+  const long size = static_cast<long>(rows) * n;
+  for_columns(n, [=](auto width, long p) {
+    using Width = decltype(width);
+    Width total = {};
+    for (long k = p; k < size; k += n) total += load_as<Width>(a + k) * load_as<Width>(b + k);
+    store(total, sum + p);
+  });
 }
 
-void weight_rates(int n, int neurons, double beta, const double* __restrict e, const double* __restrict radial,
-                  const double* __restrict activation, const double* __restrict weights, double* __restrict rate) {
-  for (int m = 0; m < neurons; ++m) {
-    const double* __restrict s = activation + m * n;
-    const double* __restrict w = weights + m * n;
-    double* __restrict out = rate + m * n;
-    for (int p = 0; p < n; ++p) out[p] = (beta * e[p]) * (s[p] - radial[p] * w[p]);
-  }
+void weight_rates(int n, int neurons, double beta, const double* e, const double* radial, const double* activation,
+                  const double* weights, double* rate) {
+  const long size = static_cast<long>(neurons) * n;
+  for_columns(n, [=](auto width, long p) {
+    using Width = decltype(width);
+    const Width push = beta * load_as<Width>(e + p);
+    const Width r = load_as<Width>(radial + p);
+    for (long k = p; k < size; k += n) {
+      store(push * (load_as<Width>(activation + k) - r * load_as<Width>(weights + k)), rate + k);
+    }
+  });
 }
 
 // rhs = scale rhs + from_error S + from_activation S_change + onto_weight W, row by row; all coefficients per column.
-void weight_corrections(int n, int neurons, const double* __restrict scale_of, const double* __restrict from_error,
-                        const double* __restrict from_activation, const double* __restrict onto_weight,
-                        const double* activation, const double* activation_change, const double* __restrict weights,
-                        double* __restrict rhs) {
-  for (int m = 0; m < neurons; ++m) {
-    const double* s = activation + m * n;
-    const double* change = activation_change + m * n;
-    const double* __restrict w = weights + m * n;
-    double* __restrict out = rhs + m * n;
-    for (int p = 0; p < n; ++p) {
-      out[p] = ((scale_of[p] * out[p] + from_error[p] * s[p]) + from_activation[p] * change[p]) + onto_weight[p] * w[p];
+void weight_corrections(int n, int neurons, const double* scale_of, const double* from_error,
+                        const double* from_activation, const double* onto_weight, const double* activation,
+                        const double* activation_change, const double* weights, double* rhs) {
+  const long size = static_cast<long>(neurons) * n;
+  for_columns(n, [=](auto width, long p) {
+    using Width = decltype(width);
+    const Width kept = load_as<Width>(scale_of + p);
+    const Width along_S = load_as<Width>(from_error + p);
+    const Width along_w = load_as<Width>(onto_weight + p);
+    const auto corrected = [=](long k) {
+      return (kept * load_as<Width>(rhs + k) + along_S * load_as<Width>(activation + k)) +
+             along_w * load_as<Width>(weights + k);
+    };
+    if (activation_change == nullptr) {
+      for (long k = p; k < size; k += n) store(corrected(k), rhs + k);
+    } else {
+      const Width along_change = load_as<Width>(from_activation + p);
+      for (long k = p; k < size; k += n) {
+        store(corrected(k) + along_change * load_as<Width>(activation_change + k), rhs + k);
+      }
     }
-  }
+  });
 }
 
 void network_moments(int n, int neurons, const double* __restrict centers, const double* __restrict activation,

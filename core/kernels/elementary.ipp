@@ -1,26 +1,5 @@
 // exp, tanh and sin of many numbers, accurate to about one unit in the last place; part of level.cpp.
 
-#if defined(__AVX512F__)
-#define MIXED_ORDER_GAME_VECTOR_BYTES 64
-#elif defined(__AVX__)
-#define MIXED_ORDER_GAME_VECTOR_BYTES 32
-#else
-#define MIXED_ORDER_GAME_VECTOR_BYTES 16
-#endif
-
-typedef double Vector __attribute__((vector_size(MIXED_ORDER_GAME_VECTOR_BYTES)));
-typedef long long VectorBits __attribute__((vector_size(MIXED_ORDER_GAME_VECTOR_BYTES)));
-
-constexpr int vector_length = MIXED_ORDER_GAME_VECTOR_BYTES / static_cast<int>(sizeof(double));
-
-inline Vector load(const double* from) {
-  Vector vector;
-  __builtin_memcpy(&vector, from, sizeof vector);
-  return vector;
-}
-
-inline void store(const Vector& vector, double* to) { __builtin_memcpy(to, &vector, sizeof vector); }
-
 inline VectorBits bits_of(const Vector& vector) { return reinterpret_cast<VectorBits>(vector); }
 inline Vector vector_of(const VectorBits& bits) { return reinterpret_cast<Vector>(bits); }
 

@@ -57,14 +57,18 @@ void solve_blocks(BlockPattern pattern, int width, const double* __restrict lowe
   }
 }
 
-void add_shared_signal(int players, int dimension, const double* __restrict gain, const double* __restrict shared,
-                       double* __restrict y) {
-  for (int i = 0; i < players; ++i) {
-    const double* __restrict row = gain + static_cast<long>(i) * players;
-    for (int l = 0; l < dimension; ++l) {
-      const double* __restrict from = shared + l * players;
-      double* __restrict to = y + (static_cast<long>(i) * dimension + l) * players;
-      for (int j = 0; j < players; ++j) to[j] += row[j] * from[j];
+void add_shared_signal(int players, int dimension, const double* gain, const double* shared, double* y) {
+  with_width(players, [=](auto width) {
+    using Width = decltype(width);
+    for (int i = 0; i < players; ++i) {
+      const double* row = gain + static_cast<long>(i) * players;
+      for (int l = 0; l < dimension; ++l) {
+        const double* from = shared + l * players;
+        double* to = y + (static_cast<long>(i) * dimension + l) * players;
+        set_row_by(width, players, to, [=](auto, long j) {
+          return load_as<Width>(to + j) + load_as<Width>(row + j) * load_as<Width>(from + j);
+        });
+      }
     }
-  }
+  });
 }

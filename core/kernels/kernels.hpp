@@ -24,6 +24,17 @@ struct BlockPattern {
   const int* target;  ///< for each column the factor entries that its pairs of rows update, see factor_blocks
 };
 
+/// All estimate blocks by their eigenvectors; see EstimateBlocks. Entries lie in rows of n = N D.
+struct BlockModes {
+  int players;
+  int n;
+  const double* vector;      ///< row k * N + i: entry i of the k-th eigenvector of each block
+  const double* eigenvalue;  ///< row k
+  const double* shared;      ///< row k: product of the k-th eigenvectors with a_.j
+};
+/// More would not pay, see EstimateBlocks.
+constexpr int most_players_by_modes = 16;
+
 struct Kernels {
   const char* level;  ///< name of the instruction set
 
@@ -51,8 +62,6 @@ struct Kernels {
   /// W' = beta e (S - radial W), row by row; radial[p] is 0 inside and w'S / W_max on the sphere.
   void (*weight_rates)(int n, int neurons, double beta, const double* e, const double* radial, const double* activation,
                        const double* weights, double* rate);
-  /// sum and sum of squares of n numbers
-  void (*moments)(int n, const double* a, double* sum, double* sum_of_squares);
   double (*dot)(int n, const double* a, const double* b);
 
   // Newton solver
@@ -61,6 +70,10 @@ struct Kernels {
   /// Solves all blocks for right-hand sides of `width` coordinates, in place: rows of width * N entries.
   void (*solve_blocks)(BlockPattern pattern, int width, const double* lower, const double* inverse_diagonal,
                        double* rhs);
+  /// inverse (N rows of n) = 1 / (1 + gamma k3 eigenvalue); gain[i * N + j] as in EstimateBlocks.
+  void (*factor_modes)(BlockModes modes, double gamma_k3, double* inverse, double* gain);
+  /// Solves all blocks, in place: N rows of n.
+  void (*solve_modes)(BlockModes modes, const double* inverse, double* rhs);
   /// Column-major LU with partial pivoting, in place; false when a pivot is zero or not finite.
   bool (*lu_factor)(int n, double* matrix, int* pivot);
   void (*lu_solve)(int n, const double* matrix, const int* pivot, double* rhs);
@@ -72,7 +85,8 @@ struct Kernels {
                              const double* along, const double* across, double* change);
   /// dy_ij = dy_ij + gain_ij dxbar_j
   void (*add_shared_signal)(int players, int dimension, const double* gain, const double* shared, double* y);
-  /// rhs = scale rhs + from_error S + from_activation S_change + onto_weight W; coefficients per column.
+  /// rhs = scale rhs + from_error S + onto_weight W + from_activation S_change; coefficients per column. The change of
+  /// the activations may be null.
   void (*weight_corrections)(int n, int neurons, const double* scale, const double* from_error,
                              const double* from_activation, const double* onto_weight, const double* activation,
                              const double* activation_change, const double* weights, double* rhs);
@@ -86,11 +100,15 @@ struct Kernels {
   /// sum of (x w)^2
   double (*weighted_square_sum)(std::int64_t n, const double* x, const double* w);
   double (*max_norm)(std::int64_t n, const double* x);
+  /// One step ahead by a Nordsieck array of columns z_0 .. z_order, order <= 5: z_j = factor[j] z_j for j > 0 unless
+  /// factor is null, then z_{j-1} = z_{j-1} + z_j for j = order .. k, for k = 1 .. order.
+  void (*predict)(std::int64_t n, int order, double* const* column, const double* factor);
   /// Negative residual of a BDF step: delta = gamma f - (rl1 zn1 + correction).
   void (*newton_residual)(std::int64_t n, double gamma, const double* f, double rl1, const double* zn1,
                           const double* correction, double* delta);
-  /// correction = correction + scale delta; returns the sum of (scale delta w)^2.
-  double (*add_correction)(std::int64_t n, double scale, const double* delta, const double* w, double* correction);
+  /// correction = correction + scale delta, y = predicted + correction.
+  void (*add_correction)(std::int64_t n, double scale, const double* delta, const double* predicted, double* correction,
+                         double* y);
 };
 
 /// The best table for this processor; constant for the life of the process.

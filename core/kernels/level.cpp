@@ -18,14 +18,17 @@ extern const Kernels MIXED_ORDER_GAME_JOIN(kernels_, MIXED_ORDER_GAME_LEVEL);
 namespace {
 
 // clang-format off: the order matters
+#include "vectors.ipp"
 #include "elementary.ipp"
 #include "sums.ipp"
 #include "rbf_network.ipp"
 #include "estimate_dynamics.ipp"
 #include "adaptation.ipp"
 #include "estimate_blocks.ipp"
+#include "estimate_modes.ipp"
 #include "dense_lu.ipp"
 #include "vector_operations.ipp"
+#include "nordsieck.ipp"
 // clang-format on
 
 }  // namespace
@@ -40,10 +43,11 @@ const Kernels MIXED_ORDER_GAME_JOIN(kernels_, MIXED_ORDER_GAME_LEVEL) = {
     estimate_rates,
     column_products,
     weight_rates,
-    moments,
     dot,
     factor_blocks,
     solve_blocks,
+    factor_modes,
+    solve_modes,
     lu_factor,
     lu_solve,
     network_moments,
@@ -56,6 +60,7 @@ const Kernels MIXED_ORDER_GAME_JOIN(kernels_, MIXED_ORDER_GAME_LEVEL) = {
     error_weights,
     weighted_square_sum,
     max_norm,
+    predict,
     newton_residual,
     add_correction,
 };

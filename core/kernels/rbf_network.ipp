@@ -1,38 +1,45 @@
 // Activations S_m(y_i) = exp(-sum over j,l of (y_ijl - c_m)^2 / rho^2); part of level.cpp.
 
 // Exponents lie at m * players + i; each activation is repeated for every coordinate.
-inline void exponentiate_and_repeat(int players, int dimension, int neurons, double* __restrict exponent,
-                                    double* __restrict activation) {
+inline void exponentiate_and_repeat(int players, int dimension, int neurons, double* exponent, double* activation) {
   // the scratch is long enough for whole vectors
   const int whole = (players * neurons + vector_length - 1) / vector_length * vector_length;
   exponential(whole, exponent, exponent);
-  for (int m = 0; m < neurons; ++m) {
-    const double* from = exponent + m * players;
-    double* to = activation + m * players * dimension;
-    for (int l = 0; l < dimension; ++l) {
-      for (int i = 0; i < players; ++i) to[l * players + i] = from[i];
+  with_width(players, [=](auto width) {
+    using Width = decltype(width);
+    for (int m = 0; m < neurons; ++m) {
+      const double* from = exponent + m * players;
+      for (int l = 0; l < dimension; ++l) {
+        set_row_by(width, players, activation + (m * dimension + l) * players,
+                   [=](auto, long i) { return load_as<Width>(from + i); });
+      }
     }
-  }
+  });
 }
 
-void activations_diagonal(int players, int dimension, int neurons, const double* __restrict centers, double width,
-                          const double* y, double* exponent, double* __restrict activation) {
+void activations_diagonal(int players, int dimension, int neurons, const double* centers, double width, const double* y,
+                          double* exponent, double* activation) {
   const int n = players * dimension;
   const double scale = 1.0 / (width * width);
-  double* __restrict sum = exponent + players * neurons + vector_length;
-  double* __restrict squares = sum + players;
+  double* sum = exponent + players * neurons + vector_length;
+  double* squares = sum + players;
   for (int i = 0; i < players; ++i) moments(n, y + i * n, sum + i, squares + i);
-  for (int m = 0; m < neurons; ++m) {
-    // sum (y - c)^2 = sum y^2 - 2 c sum y + n c^2
-    const double c = centers[m];
-    double* __restrict out = exponent + m * players;
-    for (int i = 0; i < players; ++i) out[i] = -((squares[i] - 2.0 * c * sum[i]) + n * c * c) * scale;
-  }
+  with_width(players, [=](auto lanes) {
+    using Width = decltype(lanes);
+    for (int m = 0; m < neurons; ++m) {
+      // -sum (y - c)^2 / rho^2 = (2 c sum y - sum y^2 - n c^2) / rho^2
+      const double twice = 2.0 * centers[m];
+      const double constant = n * centers[m] * centers[m];
+      set_row_by(lanes, players, exponent + m * players, [=](auto, long i) {
+        return ((twice * load_as<Width>(sum + i) - load_as<Width>(squares + i)) - constant) * scale;
+      });
+    }
+  });
   exponentiate_and_repeat(players, dimension, neurons, exponent, activation);
 }
 
 void activations_general(int players, int dimension, int neurons, const double* centers, double width, const double* y,
-                         double* __restrict exponent, double* __restrict activation) {
+                         double* exponent, double* activation) {
   const int n = players * dimension;
   const double scale = 1.0 / (width * width);
   for (int i = 0; i < players; ++i) {

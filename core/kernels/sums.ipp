@@ -1,6 +1,7 @@
 // Sums over rows in one fixed order, whatever the width of the instructions; part of level.cpp.
 //
-// Number k is added to lane k mod 8; the lanes are then added pairwise.
+// Number k is added to lane k mod 8; of n >= 8 numbers the last n mod 8 are added to the last lanes instead. The lanes
+// are then added pairwise.
 
 constexpr int lane_count = 8;
 constexpr int lane_vectors = lane_count / vector_length;
@@ -9,51 +10,80 @@ struct Lanes {
   Vector part[lane_vectors] = {};
 };
 
-/// Adds term(k, vector of them) for k = 0 .. n - 1; term(k) must do for one number what term does for a vector.
-template <typename VectorTerm, typename Term>
-inline double sum_of(int n, VectorTerm vector_term, Term term) {
+inline double sum_of_two(const Two& lanes) { return lanes[0] + lanes[1]; }
+#if MIXED_ORDER_GAME_VECTOR_BYTES >= 32
+inline double sum_of_four(const Four& lanes) {
+  return sum_of_two(__builtin_shufflevector(lanes, lanes, 0, 1) + __builtin_shufflevector(lanes, lanes, 2, 3));
+}
+#endif
+
+/// ((l0 + l4) + (l2 + l6)) + ((l1 + l5) + (l3 + l7))
+inline double sum_of_lanes(const Lanes& lanes) {
+#if MIXED_ORDER_GAME_VECTOR_BYTES >= 64
+  const Vector& l = lanes.part[0];
+  return sum_of_four(__builtin_shufflevector(l, l, 0, 1, 2, 3) + __builtin_shufflevector(l, l, 4, 5, 6, 7));
+#elif MIXED_ORDER_GAME_VECTOR_BYTES >= 32
+  return sum_of_four(lanes.part[0] + lanes.part[1]);
+#else
+  return sum_of_two((lanes.part[0] + lanes.part[2]) + (lanes.part[1] + lanes.part[3]));
+#endif
+}
+
+/// Eight of these from number r on: nothing of 8 - r numbers, then all of r.
+alignas(64) constexpr long long nothing_then_all[2 * lane_count] = {0,  0,  0,  0,  0,  0,  0,  0,
+                                                                    -1, -1, -1, -1, -1, -1, -1, -1};
+
+/// Adds term(width, k) for k = 0 .. n - 1.
+template <typename Term>
+inline double sum_of(long n, Term term) {
   Lanes sums;
-  int k = 0;
-  for (; k + lane_count <= n; k += lane_count) {
-    for (int v = 0; v < lane_vectors; ++v) sums.part[v] += vector_term(k + v * vector_length);
+  if (n < lane_count) {
+    double lanes[lane_count] = {};
+    for (long k = 0; k < n; ++k) lanes[k] = term(0.0, k);
+    __builtin_memcpy(&sums, lanes, sizeof lanes);
+    return sum_of_lanes(sums);
   }
-  double lanes[lane_count];
-  __builtin_memcpy(lanes, &sums, sizeof lanes);
-  for (int r = 0; k + r < n; ++r) lanes[r] += term(k + r);
-  return ((lanes[0] + lanes[4]) + (lanes[2] + lanes[6])) + ((lanes[1] + lanes[5]) + (lanes[3] + lanes[7]));
+  long k = 0;
+  for (; k + lane_count <= n; k += lane_count) {
+    for (int v = 0; v < lane_vectors; ++v) sums.part[v] += term(Vector{}, k + v * vector_length);
+  }
+  if (k < n) {
+    // the last eight numbers, without those that have been counted
+    const long last = n - lane_count;
+    for (int v = 0; v < lane_vectors; ++v) {
+      const Vector value = term(Vector{}, last + v * vector_length);
+      VectorBits kept;
+      __builtin_memcpy(&kept, nothing_then_all + (n - k) + v * vector_length, sizeof kept);
+      sums.part[v] += vector_of(bits_of(value) & kept);
+    }
+  }
+  return sum_of_lanes(sums);
 }
 
 double dot(int n, const double* a, const double* b) {
-  return sum_of(n, [=](int k) { return load(a + k) * load(b + k); }, [=](int k) { return a[k] * b[k]; });
+  return sum_of(n, [=](auto width, long k) {
+    using Width = decltype(width);
+    return load_as<Width>(a + k) * load_as<Width>(b + k);
+  });
 }
 
-void moments(int n, const double* a, double* sum, double* sum_of_squares) {
-  *sum = sum_of(n, [=](int k) { return load(a + k); }, [=](int k) { return a[k]; });
+inline void moments(int n, const double* a, double* sum, double* sum_of_squares) {
+  *sum = sum_of(n, [=](auto width, long k) { return load_as<decltype(width)>(a + k); });
   *sum_of_squares = dot(n, a, a);
 }
 
 inline double distance_squared(int n, const double* a, const double* b) {
-  return sum_of(
-      n,
-      [=](int k) {
-        const Vector difference = load(a + k) - load(b + k);
-        return difference * difference;
-      },
-      [=](int k) {
-        const double difference = a[k] - b[k];
-        return difference * difference;
-      });
+  return sum_of(n, [=](auto width, long k) {
+    using Width = decltype(width);
+    const Width difference = load_as<Width>(a + k) - load_as<Width>(b + k);
+    return difference * difference;
+  });
 }
 
 double weighted_square_sum(std::int64_t n, const double* x, const double* w) {
-  return sum_of(
-      static_cast<int>(n),
-      [=](int k) {
-        const Vector product = load(x + k) * load(w + k);
-        return product * product;
-      },
-      [=](int k) {
-        const double product = x[k] * w[k];
-        return product * product;
-      });
+  return sum_of(n, [=](auto width, long k) {
+    using Width = decltype(width);
+    const Width product = load_as<Width>(x + k) * load_as<Width>(w + k);
+    return product * product;
+  });
 }

@@ -1,36 +1,29 @@
 // The vector operations that CVODE spends its time in; part of level.cpp.
 
-#if defined(__clang__)
-#define MIXED_ORDER_GAME_IN_PLACE _Pragma("clang loop vectorize(assume_safety)")
-#else
-#define MIXED_ORDER_GAME_IN_PLACE _Pragma("GCC ivdep")
-#endif
-
-/// z_k = term(k), which may read entry k of z itself but no other: clang would take numbers one by one then.
-template <typename Term>
-inline void set_each(std::int64_t n, double* z, Term term) {
-  MIXED_ORDER_GAME_IN_PLACE
-  for (std::int64_t k = 0; k < n; ++k) z[k] = term(k);
-}
-
 void linear_sum(std::int64_t n, double a, const double* x, double b, const double* y, double* z) {
   // z may be x or y. The cases follow from exactness: a x - a y is computed as a (x - y), which vanishes for x = y.
+  const auto set = [=](auto term) {
+    set_row(n, z, [=](auto width, long k) {
+      using Width = decltype(width);
+      return term(load_as<Width>(x + k), load_as<Width>(y + k));
+    });
+  };
   if (b == 1.0 && a == 1.0) {
-    set_each(n, z, [=](std::int64_t k) { return x[k] + y[k]; });
+    set([](const auto& xk, const auto& yk) { return xk + yk; });
   } else if (a == 1.0 && b == -1.0) {
-    set_each(n, z, [=](std::int64_t k) { return x[k] - y[k]; });
+    set([](const auto& xk, const auto& yk) { return xk - yk; });
   } else if (a == -1.0 && b == 1.0) {
-    set_each(n, z, [=](std::int64_t k) { return y[k] - x[k]; });
+    set([](const auto& xk, const auto& yk) { return yk - xk; });
   } else if (b == 1.0) {
-    set_each(n, z, [=](std::int64_t k) { return a * x[k] + y[k]; });
+    set([=](const auto& xk, const auto& yk) { return a * xk + yk; });
   } else if (a == 1.0) {
-    set_each(n, z, [=](std::int64_t k) { return x[k] + b * y[k]; });
+    set([=](const auto& xk, const auto& yk) { return xk + b * yk; });
   } else if (a == b) {
-    set_each(n, z, [=](std::int64_t k) { return a * (x[k] + y[k]); });
+    set([=](const auto& xk, const auto& yk) { return a * (xk + yk); });
   } else if (a == -b) {
-    set_each(n, z, [=](std::int64_t k) { return a * (x[k] - y[k]); });
+    set([=](const auto& xk, const auto& yk) { return a * (xk - yk); });
   } else {
-    set_each(n, z, [=](std::int64_t k) { return a * x[k] + b * y[k]; });
+    set([=](const auto& xk, const auto& yk) { return a * xk + b * yk; });
   }
 }
 
@@ -39,15 +32,14 @@ void scale(std::int64_t n, double c, const double* x, double* z) {
     if (x != z) __builtin_memcpy(z, x, static_cast<unsigned long>(n) * sizeof(double));
     return;
   }
-  set_each(n, z, [=](std::int64_t k) { return c * x[k]; });
+  set_row(n, z, [=](auto width, long k) { return c * load_as<decltype(width)>(x + k); });
 }
 
 void fill(std::int64_t n, double c, double* z) {
-  for (std::int64_t k = 0; k < n; ++k) z[k] = c;
+  set_row(n, z, [=](auto width, long) { return decltype(width){} + c; });
 }
 
-void error_weights(std::int64_t n, double relative, double absolute, const double* __restrict y,
-                   double* __restrict weight) {
+void error_weights(std::int64_t n, double relative, double absolute, const double* y, double* weight) {
   for (std::int64_t k = 0; k < n; ++k) weight[k] = 1.0 / (relative * fabs(y[k]) + absolute);
 }
 
@@ -60,24 +52,23 @@ double max_norm(std::int64_t n, const double* x) {
   return largest;
 }
 
-void newton_residual(std::int64_t n, double gamma, const double* __restrict f, double rl1, const double* __restrict zn1,
-                     const double* __restrict correction, double* __restrict delta) {
-  for (std::int64_t k = 0; k < n; ++k) delta[k] = gamma * f[k] - (rl1 * zn1[k] + correction[k]);
+void newton_residual(std::int64_t n, double gamma, const double* f, double rl1, const double* zn1,
+                     const double* correction, double* delta) {
+  set_row(n, delta, [=](auto width, long k) {
+    using Width = decltype(width);
+    return gamma * load_as<Width>(f + k) - (rl1 * load_as<Width>(zn1 + k) + load_as<Width>(correction + k));
+  });
 }
 
-double add_correction(std::int64_t n, double scale_of, const double* delta, const double* w, double* correction) {
-  return sum_of(
-      static_cast<int>(n),
-      [=](int k) {
-        const Vector change = scale_of * load(delta + k);
-        store(load(correction + k) + change, correction + k);
-        const Vector product = change * load(w + k);
-        return product * product;
-      },
-      [=](int k) {
-        const double change = scale_of * delta[k];
-        correction[k] += change;
-        const double product = change * w[k];
-        return product * product;
-      });
+void add_correction(std::int64_t n, double scale_of, const double* delta, const double* predicted, double* correction,
+                    double* y) {
+  // correction first: its last vector is put last, so y must not read it back
+  set_row(n, y, [=](auto width, long k) {
+    using Width = decltype(width);
+    return load_as<Width>(predicted + k) + (load_as<Width>(correction + k) + scale_of * load_as<Width>(delta + k));
+  });
+  set_row(n, correction, [=](auto width, long k) {
+    using Width = decltype(width);
+    return load_as<Width>(correction + k) + scale_of * load_as<Width>(delta + k);
+  });
 }

@@ -240,22 +240,19 @@ TEST(Sums, AreThoseOfTheirFormulas) {
     const Array a(n, random);
     const Array b(n, random);
     const Array computed = on_every_level([&](const Kernels& kernel) {
-      Array sums(5);
-      kernel.moments(n, a, &sums[0], &sums[1]);
-      sums[2] = kernel.dot(n, a, b);
-      sums[3] = kernel.weighted_square_sum(n, a, b);
-      sums[4] = kernel.max_norm(n, a);
+      Array sums(3);
+      sums[0] = kernel.dot(n, a, b);
+      sums[1] = kernel.weighted_square_sum(n, a, b);
+      sums[2] = kernel.max_norm(n, a);
       return sums;
     });
-    long double expected[5] = {};
+    long double expected[3] = {};
     for (int k = 0; k < n; ++k) {
-      expected[0] += a[k];
-      expected[1] += static_cast<long double>(a[k]) * a[k];
-      expected[2] += static_cast<long double>(a[k]) * b[k];
-      expected[3] += std::pow(static_cast<long double>(a[k]) * b[k], 2);
-      expected[4] = std::max<long double>(expected[4], std::abs(a[k]));
+      expected[0] += static_cast<long double>(a[k]) * b[k];
+      expected[1] += std::pow(static_cast<long double>(a[k]) * b[k], 2);
+      expected[2] = std::max<long double>(expected[2], std::abs(a[k]));
     }
-    for (int k = 0; k < 5; ++k) EXPECT_NEAR(computed[k], static_cast<double>(expected[k]), 1e-15 * n * 4.0) << k;
+    for (int k = 0; k < 3; ++k) EXPECT_NEAR(computed[k], static_cast<double>(expected[k]), 1e-15 * n * 4.0) << k;
   }
 }
 
@@ -266,14 +263,13 @@ TEST(Sums, PassOnWhatIsNotANumber) {
       Array a(n, 1.0);
       a[where] = not_a_number;
       const Array computed = on_every_level([&](const Kernels& kernel) {
-        Array sums(4);
-        kernel.moments(n, a, &sums[0], &sums[1]);
-        sums[2] = kernel.dot(n, a, ones);
-        sums[3] = kernel.weighted_square_sum(n, ones, a);
-        for (int k = 0; k < 4; ++k) sums[k] = std::isnan(sums[k]) ? 1.0 : 0.0;
+        Array sums(2);
+        sums[0] = kernel.dot(n, a, ones);
+        sums[1] = kernel.weighted_square_sum(n, ones, a);
+        for (int k = 0; k < 2; ++k) sums[k] = std::isnan(sums[k]) ? 1.0 : 0.0;
         return sums;
       });
-      for (int k = 0; k < 4; ++k) EXPECT_EQ(computed[k], 1.0) << k;
+      for (int k = 0; k < 2; ++k) EXPECT_EQ(computed[k], 1.0) << k;
     }
   }
 }
@@ -408,6 +404,11 @@ TEST(Columns, FollowTheirFormulas) {
       kernel.weight_corrections(n, rows, scale, e, from_activation, onto_weight, S, change, w, rhs);
       return rhs;
     });
+    const Array uncoupled = on_every_level([&](const Kernels& kernel) {
+      Array rhs(S);
+      kernel.weight_corrections(n, rows, scale, e, nullptr, onto_weight, S, nullptr, w, rhs);
+      return rhs;
+    });
     const Array moments = on_every_level([&](const Kernels& kernel) {
       Array sums(3 * n, 9.0);
       kernel.network_moments(n, rows, centers, S, w, sums, sums + n, sums + 2 * n);
@@ -429,6 +430,7 @@ TEST(Columns, FollowTheirFormulas) {
         EXPECT_NEAR(rates[k], 30.0 * e[p] * (S[k] - r[p] * w[k]), 1e-12);
         EXPECT_NEAR(corrected[k],
                     scale[p] * S[k] + e[p] * S[k] + from_activation[p] * change[k] + onto_weight[p] * w[k], 1e-14);
+        EXPECT_NEAR(uncoupled[k], scale[p] * S[k] + e[p] * S[k] + onto_weight[p] * w[k], 1e-14);
         EXPECT_NEAR(changes[k], S[k] * -0.5 * (e[p] - centers[m] * r[p]), 1e-14);
       }
       EXPECT_NEAR(products[p], product, 1e-14);
@@ -516,6 +518,49 @@ TEST(Blocks, AreFactoredAndSolvedSideBySide) {
           }
           EXPECT_NEAR(sum, of_player(rhs, i, h, j), 1e-13) << n;
         }
+      }
+    }
+  }
+}
+
+TEST(Blocks, AreSolvedByTheirModes) {
+  RandomNumbers random(16);
+  for (const auto& [N, dimension, neurons] : loop_sizes) {
+    const int n = N * dimension;
+    const Array vector(N * N * n, random), eigenvalue(N * n, random, 0.0, 9.0), shared(N * n, random),
+        rhs(N * n, random);
+    const BlockModes modes{N, n, vector, eigenvalue, shared};
+    constexpr double gamma_k3 = 0.7;
+    Array inverse(N * n);
+    for (int k = 0; k < N * n; ++k) inverse[k] = 1.0 / (1.0 + gamma_k3 * eigenvalue[k]);
+    const Array factors = on_every_level([&](const Kernels& kernel) {
+      Array all(N * n + N * N, 9.0);
+      kernel.factor_modes(modes, gamma_k3, all, all + N * n);
+      return all;
+    });
+    const Array solution = on_every_level([&](const Kernels& kernel) {
+      Array x(rhs);
+      kernel.solve_modes(modes, inverse, x);
+      return x;
+    });
+    const auto sum_of_modes = [&](int i, int p, auto coefficient) {
+      double sum = 0.0;
+      for (int k = 0; k < N; ++k) sum += vector[(k * N + i) * n + p] * inverse[k * n + p] * coefficient(k);
+      return sum;
+    };
+    for (int k = 0; k < N * n; ++k) EXPECT_DOUBLE_EQ(factors[k], inverse[k]);
+    for (int i = 0; i < N; ++i) {
+      for (int j = 0; j < N; ++j) {
+        const double gain = gamma_k3 * sum_of_modes(i, j, [&](int k) { return shared[k * n + j]; });
+        EXPECT_NEAR(factors[N * n + i * N + j], gain, 1e-14) << N;
+      }
+      for (int p = 0; p < n; ++p) {
+        const auto along = [&](int k) {
+          double sum = 0.0;
+          for (int h = 0; h < N; ++h) sum += vector[(k * N + h) * n + p] * rhs[h * n + p];
+          return sum;
+        };
+        EXPECT_NEAR(solution[i * n + p], sum_of_modes(i, p, along), 1e-13) << N;
       }
     }
   }
@@ -635,6 +680,57 @@ TEST(Vectors, AreScaledFilledAndWeighted) {
       return weight;
     });
     for (int k = 0; k < n; ++k) EXPECT_DOUBLE_EQ(weights[k], 1.0 / (1e-3 * std::abs(x[k]) + 1e-6));
+  }
+}
+
+TEST(Vectors, MakeAStepOfNewtonsIteration) {
+  RandomNumbers random(17);
+  for (const int n : sizes) {
+    const Array f(n, random), zn1(n, random), correction(n, random), predicted(n, random), delta(n, random);
+    const Array residual = on_every_level([&](const Kernels& kernel) {
+      Array out(n, 9.0);
+      kernel.newton_residual(n, 0.3, f, 0.7, zn1, correction, out);
+      return out;
+    });
+    const Array moved = on_every_level([&](const Kernels& kernel) {
+      Array both(2 * n, 9.0);
+      for (int k = 0; k < n; ++k) both[k] = correction[k];
+      kernel.add_correction(n, 0.8, delta, predicted, both, both + n);
+      return both;
+    });
+    for (int k = 0; k < n; ++k) {
+      EXPECT_NEAR(residual[k], 0.3 * f[k] - 0.7 * zn1[k] - correction[k], 1e-15);
+      EXPECT_NEAR(moved[k], correction[k] + 0.8 * delta[k], 1e-15);
+      EXPECT_EQ(moved[n + k], predicted[k] + moved[k]);
+    }
+  }
+}
+
+TEST(Vectors, ArePredictedByPascalsTriangle) {
+  RandomNumbers random(18);
+  for (const int n : sizes) {
+    for (int order = 1; order <= 5; ++order) {
+      const Array start((order + 1) * n, random), factor(order + 1, random);
+      for (const bool scaled : {false, true}) {
+        const Array predicted = on_every_level([&](const Kernels& kernel) {
+          Array z(start);
+          std::vector<double*> column;
+          for (int j = 0; j <= order; ++j) column.push_back(z + j * n);
+          kernel.predict(n, order, column.data(), scaled ? static_cast<const double*>(factor) : nullptr);
+          return z;
+        });
+        for (int k = 0; k < n; ++k) {
+          for (int j = 0; j <= order; ++j) {  // z_j + (j + 1 over j) z_{j + 1} + ...
+            double expected = 0.0, binomial = 1.0;
+            for (int i = j; i <= order; ++i) {
+              expected += binomial * start[i * n + k] * (scaled && i > 0 ? factor[i] : 1.0);
+              binomial = binomial * (i + 1) / (i + 1 - j);
+            }
+            EXPECT_NEAR(predicted[j * n + k], expected, 1e-13);
+          }
+        }
+      }
+    }
   }
 }
 

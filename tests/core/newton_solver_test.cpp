@@ -94,11 +94,18 @@ TEST_P(StructuredNewton, SolvesTheSameSystemAsDenseElimination) {
 }
 
 INSTANTIATE_TEST_SUITE_P(AssortedGames, StructuredNewton, ::testing::ValuesIn(assorted_recipes()));
+// too many players for the modes of the estimate blocks
+INSTANTIATE_TEST_SUITE_P(
+    ManyPlayers, StructuredNewton,
+    ::testing::Values(Recipe{.seed = 12, .players = most_players_by_modes + 1, .dimension = 1, .neurons = 3},
+                      Recipe{.seed = 13, .players = 19, .dimension = 2, .neurons = 2, .diagonal = false}));
 
-TEST(StructuredNewtonOnGraphs, StarPathRingAndCompleteGraph) {
-  const std::size_t N = 11;
+class StructuredNewtonOnGraphs : public ::testing::TestWithParam<std::size_t> {};
+
+TEST_P(StructuredNewtonOnGraphs, StarPathRingAndCompleteGraph) {
+  const std::size_t N = GetParam();
   PlainGame game = random_game({.seed = 21, .players = N, .dimension = 2, .neurons = 3});
-  const auto linked = [](const std::string& kind, std::size_t i, std::size_t j) {  // i < j
+  const auto linked = [N](const std::string& kind, std::size_t i, std::size_t j) {  // i < j
     if (kind == "star") return i == 0;
     if (kind == "path") return j == i + 1;
     if (kind == "ring") return j == i + 1 || (i == 0 && j == N - 1);
@@ -116,6 +123,8 @@ TEST(StructuredNewtonOnGraphs, StarPathRingAndCompleteGraph) {
     system.compare(false, 3e-3);
   }
 }
+
+INSTANTIATE_TEST_SUITE_P(ByModesAndByElimination, StructuredNewtonOnGraphs, ::testing::Values(11, 18));
 
 TEST(StructuredNewtonRefresh, FollowsNewEdgesAndCouplings) {
   const PlainGame before = random_game({.seed = 31, .players = 5, .dimension = 2, .neurons = 3});

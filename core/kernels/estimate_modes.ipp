@@ -1,0 +1,42 @@
+// The N matrices I + gamma k3 (L + diag(a_.j)) by the eigenvectors of L + diag(a_.j), all at once; part of level.cpp.
+
+void factor_modes(BlockModes modes, double gamma_k3, double* inverse, double* gain) {
+  const int N = modes.players;
+  const long n = modes.n;
+  set_row(N * n, inverse,
+          [=](auto width, long k) { return 1.0 / (1.0 + gamma_k3 * load_as<decltype(width)>(modes.eigenvalue + k)); });
+  with_width(N, [=](auto width) {
+    using Width = decltype(width);
+    for (int i = 0; i < N; ++i) {
+      set_row_by(width, N, gain + i * N, [=](auto, long j) {
+        Width sum = {};
+        for (int k = 0; k < N; ++k) {
+          const Width share = load_as<Width>(modes.shared + k * n + j) * load_as<Width>(inverse + k * n + j);
+          sum += load_as<Width>(modes.vector + (k * N + i) * n + j) * share;
+        }
+        return gamma_k3 * sum;
+      });
+    }
+  });
+}
+
+void solve_modes(BlockModes modes, const double* inverse, double* rhs) {
+  const int N = modes.players;
+  const long n = modes.n;
+  for_columns(n, [=](auto width, long p) __attribute__((always_inline)) {
+    using Width = decltype(width);
+    Width along[most_players_by_modes];
+    const double* vector = modes.vector + p;
+    for (int k = 0; k < N; ++k) {
+      Width sum = {};
+      for (int i = 0; i < N; ++i, vector += n) sum += load_as<Width>(vector) * load_as<Width>(rhs + i * n + p);
+      along[k] = sum * load_as<Width>(inverse + k * n + p);
+    }
+    for (int i = 0; i < N; ++i) {
+      vector = modes.vector + i * n + p;
+      Width sum = {};
+      for (int k = 0; k < N; ++k, vector += N * n) sum += load_as<Width>(vector) * along[k];
+      store(sum, rhs + i * n + p);
+    }
+  });
+}
