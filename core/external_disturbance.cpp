@@ -1,6 +1,7 @@
 #include "external_disturbance.hpp"
 
 #include <algorithm>
+#include <iterator>
 
 namespace mixed_order_game {
 
@@ -9,14 +10,27 @@ ExternalDisturbance::ExternalDisturbance(int entries) : polynomial_(at(entries))
 void ExternalDisturbance::set_value(int entry, Real value) {
   polynomial_[at(entry)] = Polynomial{};
   polynomial_[at(entry)].coefficient[0] = value;
+  find_derivatives();
 }
 
 void ExternalDisturbance::set_derivative(int entry, int order, Real derivative, Real t) {
   polynomial_[at(entry)].coefficient[at(order)] = derivative;
   polynomial_[at(entry)].since = t;
+  find_derivatives();
+}
+
+void ExternalDisturbance::find_derivatives() {
+  has_derivatives_ = std::any_of(polynomial_.begin(), polynomial_.end(), [](const Polynomial& polynomial) {
+    return std::any_of(std::next(polynomial.coefficient), std::end(polynomial.coefficient),
+                       [](Real derivative) { return derivative != 0.0; });
+  });
 }
 
 void ExternalDisturbance::values(Real t, Real* d_ext) const {
+  if (!has_derivatives_) {
+    for (std::size_t p = 0; p < polynomial_.size(); ++p) d_ext[p] = polynomial_[p].coefficient[0];
+    return;
+  }
   for (std::size_t p = 0; p < polynomial_.size(); ++p) {
     const auto& [c, since] = polynomial_[p];
     const Real h = t - since;
@@ -39,6 +53,7 @@ std::span<const Real> ExternalDisturbance::numbers() const {
 
 void ExternalDisturbance::set_numbers(std::span<const Real> numbers) {
   std::copy(numbers.begin(), numbers.end(), reinterpret_cast<Real*>(polynomial_.data()));
+  find_derivatives();
 }
 
 }  // namespace mixed_order_game

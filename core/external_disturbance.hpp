@@ -5,6 +5,7 @@
 #pragma once
 
 #include <span>
+#include <vector>
 
 #include "types.hpp"
 
@@ -38,7 +39,10 @@ class ExternalDisturbance {
     Real coefficient[highest_derivative + 1] = {};
     Real since = 0.0;
   };
+  void find_derivatives();
+
   std::vector<Polynomial> polynomial_;
+  bool has_derivatives_ = false;
 };
 
 }  // namespace mixed_order_game

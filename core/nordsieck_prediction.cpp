@@ -17,8 +17,10 @@ void NordsieckPrediction::scale(int count, const Real* factors, Real* const* col
   }
 }
 
-void NordsieckPrediction::add(Real* to, const Real* from) {
-  if (additions_ == most_additions) finish();
+void NordsieckPrediction::add(Real* to, const Real* from, bool subtract) {
+  if (additions_ == most_additions || (subtract != subtract_ && additions_ != 0) || (subtract && scaled_ != 0))
+    finish();
+  subtract_ = subtract;
   addition_[at(additions_++)] = {to, from};
 }
 
@@ -43,7 +45,11 @@ void NordsieckPrediction::carry_out() {
   std::array<Real*, most_order + 1> columns{};
   for (int order = 1; order <= most_order; ++order) {
     if (!is_prediction(order, &columns)) continue;
-    kernels().predict(size_, order, columns.data(), scaled_ != 0 ? factor_.data() : nullptr);
+    if (subtract_) {
+      kernels().predict_back(size_, order, columns.data());
+    } else {
+      kernels().predict(size_, order, columns.data(), scaled_ != 0 ? factor_.data() : nullptr);
+    }
     return forget();
   }
   for (int j = 0; j < scaled_; ++j) {
@@ -51,7 +57,7 @@ void NordsieckPrediction::carry_out() {
   }
   for (int k = 0; k < additions_; ++k) {
     const auto& [to, from] = addition_[at(k)];
-    kernels().linear_sum(size_, 1.0, to, 1.0, from, to);
+    kernels().linear_sum(size_, 1.0, to, subtract_ ? -1.0 : 1.0, from, to);
   }
   forget();
 }

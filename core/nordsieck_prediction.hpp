@@ -18,8 +18,8 @@ class NordsieckPrediction {
 
   /// Keeps back columns[j] = factors[j] columns[j].
   void scale(int count, const Real* factors, Real* const* columns);
-  /// Keeps back to = to + from.
-  void add(Real* to, const Real* from);
+  /// Keeps back to = to + from, or to - from.
+  void add(Real* to, const Real* from, bool subtract = false);
   /// Does what has been kept back: in one pass when it is a prediction, otherwise one by one.
   void finish() {
     if (scaled_ + additions_ != 0) carry_out();
@@ -41,6 +41,7 @@ class NordsieckPrediction {
   std::array<Real*, most_order> scaled_column_{};
   std::array<Real, most_order + 1> factor_{};  // of z_j
   int additions_ = 0;
+  bool subtract_ = false;  // all of them
   std::array<Addition, most_additions> addition_{};
 };
 

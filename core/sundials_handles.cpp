@@ -62,7 +62,7 @@ N_Vector clone_vector(N_Vector vector) {
 
 void vector_linear_sum(SunReal a, N_Vector x, SunReal b, N_Vector y, N_Vector z) {
   NordsieckPrediction& prediction = prediction_of(z);
-  if (a == 1.0 && b == 1.0 && x == z) return prediction.add(NV_DATA_S(z), NV_DATA_S(y));
+  if (a == 1.0 && std::fabs(b) == 1.0 && x == z) return prediction.add(NV_DATA_S(z), NV_DATA_S(y), b < 0.0);
   prediction.finish();
   kernels().linear_sum(NV_LENGTH_S(x), a, NV_DATA_S(x), b, NV_DATA_S(y), NV_DATA_S(z));
 }

@@ -103,6 +103,8 @@ struct Kernels {
   /// One step ahead by a Nordsieck array of columns z_0 .. z_order, order <= 5: z_j = factor[j] z_j for j > 0 unless
   /// factor is null, then z_{j-1} = z_{j-1} + z_j for j = order .. k, for k = 1 .. order.
   void (*predict)(std::int64_t n, int order, double* const* column, const double* factor);
+  /// Takes a prediction back: z_{j-1} = z_{j-1} - z_j, in the same sequence.
+  void (*predict_back)(std::int64_t n, int order, double* const* column);
   /// Negative residual of a BDF step: delta = gamma f - (rl1 zn1 + correction).
   void (*newton_residual)(std::int64_t n, double gamma, const double* f, double rl1, const double* zn1,
                           const double* correction, double* delta);

@@ -61,6 +61,7 @@ const Kernels MIXED_ORDER_GAME_JOIN(kernels_, MIXED_ORDER_GAME_LEVEL) = {
     weighted_square_sum,
     max_norm,
     predict,
+    predict_back,
     newton_residual,
     add_correction,
 };

@@ -1,7 +1,7 @@
-// CVODE's prediction from its Nordsieck columns; part of level.cpp.
+// CVODE's prediction from its Nordsieck columns, and the way back; part of level.cpp.
 
-template <int order, bool scaled>
-void predict(long n, double* const* column, const double* factor) {
+template <int order, bool scaled, bool back>
+void predict_of_order(long n, double* const* column, const double* factor) {
   for_columns(n, [=](auto width, long p) __attribute__((always_inline)) {
     using Width = decltype(width);
     Width z[order + 1];
@@ -11,34 +11,42 @@ void predict(long n, double* const* column, const double* factor) {
       store(z[order], column[order] + p);
     }
     for (int k = 1; k <= order; ++k) {
-      for (int j = order; j >= k; --j) z[j - 1] += z[j];
+      for (int j = order; j >= k; --j) z[j - 1] = back ? z[j - 1] - z[j] : z[j - 1] + z[j];
     }
     for (int j = 0; j < order; ++j) store(z[j], column[j] + p);
   });
 }
 
 template <int order>
-inline void predict_by_order(long n, double* const* column, const double* factor) {
-  if (factor != nullptr) {
-    predict<order, true>(n, column, factor);
+inline void predict_by(long n, double* const* column, const double* factor, bool back) {
+  if (back) {
+    predict_of_order<order, false, true>(n, column, nullptr);
+  } else if (factor == nullptr) {
+    predict_of_order<order, false, false>(n, column, nullptr);
   } else {
-    predict<order, false>(n, column, nullptr);
+    predict_of_order<order, true, false>(n, column, factor);
   }
 }
 
-void predict(std::int64_t n, int order, double* const* column, const double* factor) {
+inline void by_order(std::int64_t n, int order, double* const* column, const double* factor, bool back) {
   switch (order) {
     case 1:
-      return predict_by_order<1>(n, column, factor);
+      return predict_by<1>(n, column, factor, back);
     case 2:
-      return predict_by_order<2>(n, column, factor);
+      return predict_by<2>(n, column, factor, back);
     case 3:
-      return predict_by_order<3>(n, column, factor);
+      return predict_by<3>(n, column, factor, back);
     case 4:
-      return predict_by_order<4>(n, column, factor);
+      return predict_by<4>(n, column, factor, back);
     case 5:
-      return predict_by_order<5>(n, column, factor);
+      return predict_by<5>(n, column, factor, back);
     default:
       return;
   }
 }
+
+void predict(std::int64_t n, int order, double* const* column, const double* factor) {
+  by_order(n, order, column, factor, false);
+}
+
+void predict_back(std::int64_t n, int order, double* const* column) { by_order(n, order, column, nullptr, true); }

@@ -1,7 +1,7 @@
 // Sums over rows in one fixed order, whatever the width of the instructions; part of level.cpp.
 //
-// Number k is added to lane k mod 8; of n >= 8 numbers the last n mod 8 are added to the last lanes instead. The lanes
-// are then added pairwise.
+// Numbers are added in groups of eight, one to each lane, by turns to one of two sets of lanes; of n >= 8 numbers the
+// last n mod 8 go to the last lanes. The sets are then added, and the lanes pairwise.
 
 constexpr int lane_count = 8;
 constexpr int lane_vectors = lane_count / vector_length;
@@ -36,28 +36,37 @@ alignas(64) constexpr long long nothing_then_all[2 * lane_count] = {0,  0,  0,  
 /// Adds term(width, k) for k = 0 .. n - 1.
 template <typename Term>
 inline double sum_of(long n, Term term) {
-  Lanes sums;
+  Lanes even;
+  Lanes odd;
   if (n < lane_count) {
     double lanes[lane_count] = {};
     for (long k = 0; k < n; ++k) lanes[k] = term(0.0, k);
-    __builtin_memcpy(&sums, lanes, sizeof lanes);
-    return sum_of_lanes(sums);
+    __builtin_memcpy(&even, lanes, sizeof lanes);
+    return sum_of_lanes(even);
   }
+  const auto add_eight = [&](long k, Lanes* sums) {
+    for (int v = 0; v < lane_vectors; ++v) sums->part[v] += term(Vector{}, k + v * vector_length);
+  };
   long k = 0;
-  for (; k + lane_count <= n; k += lane_count) {
-    for (int v = 0; v < lane_vectors; ++v) sums.part[v] += term(Vector{}, k + v * vector_length);
+  for (; k + 2 * lane_count <= n; k += 2 * lane_count) {
+    add_eight(k, &even);
+    add_eight(k + lane_count, &odd);
+  }
+  if (k + lane_count <= n) {
+    add_eight(k, &even);
+    k += lane_count;
   }
   if (k < n) {
     // the last eight numbers, without those that have been counted
-    const long last = n - lane_count;
     for (int v = 0; v < lane_vectors; ++v) {
-      const Vector value = term(Vector{}, last + v * vector_length);
+      const Vector value = term(Vector{}, n - lane_count + v * vector_length);
       VectorBits kept;
       __builtin_memcpy(&kept, nothing_then_all + (n - k) + v * vector_length, sizeof kept);
-      sums.part[v] += vector_of(bits_of(value) & kept);
+      odd.part[v] += vector_of(bits_of(value) & kept);
     }
   }
-  return sum_of_lanes(sums);
+  for (int v = 0; v < lane_vectors; ++v) even.part[v] += odd.part[v];
+  return sum_of_lanes(even);
 }
 
 double dot(int n, const double* a, const double* b) {

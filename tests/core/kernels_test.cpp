@@ -729,6 +729,18 @@ TEST(Vectors, ArePredictedByPascalsTriangle) {
             EXPECT_NEAR(predicted[j * n + k], expected, 1e-13);
           }
         }
+        const Array back = on_every_level([&](const Kernels& kernel) {
+          Array z(predicted);
+          std::vector<double*> column;
+          for (int j = 0; j <= order; ++j) column.push_back(z + j * n);
+          kernel.predict_back(n, order, column.data());
+          return z;
+        });
+        for (int k = 0; k < n; ++k) {
+          for (int j = 0; j <= order; ++j) {
+            EXPECT_NEAR(back[j * n + k], start[j * n + k] * (scaled && j > 0 ? factor[j] : 1.0), 1e-13);
+          }
+        }
       }
     }
   }

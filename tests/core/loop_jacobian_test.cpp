@@ -77,7 +77,7 @@ void expect_close(const Rows& computed, const Rows& expected) {
     for (const Real entry : expected[row]) largest = std::max(largest, std::abs(entry));
     for (std::size_t column = 0; column < expected.size(); ++column) {
       ASSERT_NEAR(computed[row][column], expected[row][column],
-                  1e-12 * (std::abs(expected[row][column]) + 0.01 * largest))
+                  1e-11 * (std::abs(expected[row][column]) + 0.01 * largest))
           << "row " << row << ", column " << column;
     }
   }

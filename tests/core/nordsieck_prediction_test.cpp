@@ -28,9 +28,9 @@ class Columns {
     }
   }
 
-  void add(int to, int from) {
+  void add(int to, int from, Real sign = 1.0) {
     for (auto* columns : {&own_, &plain_}) {
-      N_VLinearSum(1.0, (*columns)[at(to)].get(), 1.0, (*columns)[at(from)].get(), (*columns)[at(to)].get());
+      N_VLinearSum(1.0, (*columns)[at(to)].get(), sign, (*columns)[at(from)].get(), (*columns)[at(to)].get());
     }
   }
   void scale(int first, std::vector<Real> factors) {
@@ -40,9 +40,9 @@ class Columns {
       N_VScaleVectorArray(static_cast<int>(factors.size()), factors.data(), several.data(), several.data());
     }
   }
-  void predict(int order) {
+  void predict(int order, Real sign = 1.0) {
     for (int k = 1; k <= order; ++k) {
-      for (int j = order; j >= k; --j) add(j - 1, j);
+      for (int j = order; j >= k; --j) add(j - 1, j, sign);
     }
   }
   /// The operation that ends a prediction.
@@ -78,6 +78,9 @@ TEST(NordsieckPrediction, GivesTheBitsOfSeparateOperations) {
         columns.predict(order);
         columns.fill(order + 1);
         columns.expect_equal();
+        if (step == 2) columns.predict(order, -1.0);  // a step that failed
+        columns.fill(order + 1);
+        columns.expect_equal();
       }
     }
   }
@@ -107,6 +110,18 @@ TEST(NordsieckPrediction, WorksInAnyOtherOrderOfOperations) {
   columns.add(2, 2);
   settle();
   columns.predict(6);  // longer than any of BDF
+  settle();
+  columns.predict(2);  // there, back and there again
+  columns.predict(2, -1.0);
+  columns.scale(1, {0.5, 0.25});
+  columns.predict(2);
+  settle();
+  columns.scale(1, {0.5, 0.25});  // scaled, then back
+  columns.predict(2, -1.0);
+  settle();
+  columns.add(0, 1);  // of either sign
+  columns.add(1, 2, -1.0);
+  columns.add(0, 1);
   settle();
   columns.predict(5);  // two in a row
   columns.predict(5);
