@@ -90,11 +90,13 @@ def peers(context: Context, reference: PaperReference) -> dict[str, Solve]:
     from .peers.sundae_cvode import SundaeCvode
 
     game, times = read_game(PAPER_GAME), reference.times
-    found: dict[str, Solve] = {"CasADi CVODES": CasadiCvodes(game, times, reference.switches).solve}
-    csparse = CasadiCvodes(game, times, reference.switches, linear_solver="csparse")
-    found["CasADi CVODES, csparse"] = csparse.solve
+    found: dict[str, Solve] = {"CasADi CVODES": CasadiCvodes(game, times).solve}
+    told = reference.switches
+    found["CasADi CVODES, told the switches"] = CasadiCvodes(game, times, told).solve
+    csparse = CasadiCvodes(game, times, told, linear_solver="csparse")
+    found["CasADi CVODES, told, csparse"] = csparse.solve
     if context.jit:
-        found["CasADi CVODES, compiled"] = CasadiCvodes(game, times, reference.switches, jit=True).solve
+        found["CasADi CVODES, told, compiled"] = CasadiCvodes(game, times, told, jit=True).solve
     found["scikit-sundae CVODE"] = SundaeCvode(game, times).solve
     found["SciPy LSODA"] = ScipySolver(game, times, "LSODA").solve
     found["SciPy BDF"] = ScipySolver(game, times, "BDF", sparse=True).solve

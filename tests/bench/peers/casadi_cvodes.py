@@ -1,8 +1,10 @@
 """CasADi's CVODES with its exact sparse Jacobian.
 
-The projection modes enter as parameters and the run is cut at the switch times, which CasADi is given:
-locating them costs it nothing (its own event detection, marked experimental in 3.8, ends in an error of
-CVODES here). Each piece is an integrator of its own, made and with jit compiled before the clock starts. The
+CasADi locates no events here: its own detection, marked experimental in 3.8, ends in an error of CVODES. A
+user therefore writes the projection's condition into the rates (`if_else`) and lets the integrator find its
+way across the switches. As the best case that nobody has outside a benchmark, the run can instead be told
+the switch times: the modes enter as parameters, the run is cut at the switches, and locating them costs
+nothing. Each piece is an integrator of its own, made and with jit compiled before the clock starts. The
 activations come from the sums of y and y^2, which all centres share. The linear solver is CasADi's default,
 qr, unless another is named; csparse takes more than twice its time here.
 """
@@ -24,6 +26,18 @@ from tests.oracle.paper_equations import ROBUST_CONSTANT
 from .hybrid_model import HybridModel, Solution, rows_of
 
 Switches = list[tuple[float, int]]  # time in s and weight column, in order
+
+
+def with_modes_inside(game: Game, dae: dict[str, Any]) -> dict[str, Any]:
+    """The loop whose columns are on the sphere where w'w >= W_max and e w'S >= 0, without mode parameters."""
+    n = game.players * game.dimension
+    first = (2 + game.players) * n  # of the weights
+    rows = [slice(first + m * n, first + (m + 1) * n) for m in range(game.neurons)]
+    inside = ca.substitute(dae["ode"], dae["p"], ca.SX.zeros(n))
+    squares = sum(dae["x"][row] ** 2 for row in rows)
+    outward = sum(dae["x"][row] * inside[row] for row in rows)  # beta e w'S
+    modes = ca.if_else(ca.logic_and(squares >= game.W_max, outward >= 0.0), 1.0, 0.0)
+    return {"t": dae["t"], "x": dae["x"], "ode": ca.substitute(dae["ode"], dae["p"], modes)}
 
 
 def symbolic_loop(game: Game) -> dict[str, Any]:
@@ -90,21 +104,23 @@ def symbolic_loop(game: Game) -> dict[str, Any]:
 
 
 class CasadiCvodes:
-    """One game with fixed output times and switches, at any tolerance."""
+    """One game with fixed output times, at any tolerance: told the switches, or the modes in its rates."""
 
     def __init__(
         self,
         game: Game,
         times: FloatArray,
-        switches: Switches,
+        switches: Switches | None = None,
         *,
         jit: bool = False,
         linear_solver: str = "qr",
     ) -> None:
         self.model = HybridModel(game)
-        self.times, self.switches = times, switches
+        self.times, self.switches = times, switches or []
         self.linear_solver, self.jit = linear_solver, jit
         self.dae = symbolic_loop(game)
+        if switches is None:
+            self.dae = with_modes_inside(game, self.dae)
         self.pieces: dict[float, list[tuple[Any, slice]]] = {}
 
     def prepare(self, rtol: float) -> None:
@@ -147,7 +163,8 @@ class CasadiCvodes:
         states[0] = state
         begun = time.process_time()
         for number, (integrator, rows) in enumerate(self.pieces[rtol]):
-            result = np.asarray(integrator(x0=state, p=modes)["xf"])
+            told = {"p": modes} if self.switches else {}
+            result = np.asarray(integrator(x0=state, **told)["xf"])
             states[rows] = result[:, :-1].T
             state = result[:, -1].copy()
             if number < len(self.switches):
