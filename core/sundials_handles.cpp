@@ -58,7 +58,8 @@ N_Vector clone_vector(N_Vector vector) {
   return clone;
 }
 
-// CVODE spends its time in a handful of vector operations: these replace the library's by the kernels.
+// CVODE spends its time in a handful of vector operations: these replace the library's by the kernels. The others
+// belong to the choice of the first step, when no prediction is kept back.
 
 void vector_linear_sum(SunReal a, N_Vector x, SunReal b, N_Vector y, N_Vector z) {
   NordsieckPrediction& prediction = prediction_of(z);

@@ -1,23 +1,23 @@
 // Adaptation of the weights, W' = beta e (S - radial W), and the sums w'S and w'w; part of level.cpp.
 
 void column_products(int n, int rows, const double* a, const double* b, double* sum) {
-  const long size = static_cast<long>(rows) * n;
-  for_columns(n, [=](auto width, long p) {
+  const Index size = static_cast<Index>(rows) * n;
+  for_columns(n, [=](auto width, Index p) {
     using Width = decltype(width);
     Width total = {};
-    for (long k = p; k < size; k += n) total += load_as<Width>(a + k) * load_as<Width>(b + k);
+    for (Index k = p; k < size; k += n) total += load_as<Width>(a + k) * load_as<Width>(b + k);
     store(total, sum + p);
   });
 }
 
 void weight_rates(int n, int neurons, double beta, const double* e, const double* radial, const double* activation,
                   const double* weights, double* rate) {
-  const long size = static_cast<long>(neurons) * n;
-  for_columns(n, [=](auto width, long p) {
+  const Index size = static_cast<Index>(neurons) * n;
+  for_columns(n, [=](auto width, Index p) {
     using Width = decltype(width);
     const Width push = beta * load_as<Width>(e + p);
     const Width r = load_as<Width>(radial + p);
-    for (long k = p; k < size; k += n) {
+    for (Index k = p; k < size; k += n) {
       store(push * (load_as<Width>(activation + k) - r * load_as<Width>(weights + k)), rate + k);
     }
   });
@@ -27,21 +27,21 @@ void weight_rates(int n, int neurons, double beta, const double* e, const double
 void weight_corrections(int n, int neurons, const double* scale_of, const double* from_error,
                         const double* from_activation, const double* onto_weight, const double* activation,
                         const double* activation_change, const double* weights, double* rhs) {
-  const long size = static_cast<long>(neurons) * n;
-  for_columns(n, [=](auto width, long p) {
+  const Index size = static_cast<Index>(neurons) * n;
+  for_columns(n, [=](auto width, Index p) {
     using Width = decltype(width);
     const Width kept = load_as<Width>(scale_of + p);
     const Width along_S = load_as<Width>(from_error + p);
     const Width along_w = load_as<Width>(onto_weight + p);
-    const auto corrected = [=](long k) {
+    const auto corrected = [=](Index k) {
       return (kept * load_as<Width>(rhs + k) + along_S * load_as<Width>(activation + k)) +
              along_w * load_as<Width>(weights + k);
     };
     if (activation_change == nullptr) {
-      for (long k = p; k < size; k += n) store(corrected(k), rhs + k);
+      for (Index k = p; k < size; k += n) store(corrected(k), rhs + k);
     } else {
       const Width along_change = load_as<Width>(from_activation + p);
-      for (long k = p; k < size; k += n) {
+      for (Index k = p; k < size; k += n) {
         store(corrected(k) + along_change * load_as<Width>(activation_change + k), rhs + k);
       }
     }

@@ -2,13 +2,13 @@
 
 void estimate_rates(int players, int dimension, NeighbourRows graph, double k3, const double* y, const double* xbar,
                     double* rate) {
-  const long n = static_cast<long>(players) * dimension;
+  const Index n = static_cast<Index>(players) * dimension;
   for (int i = 0; i < players; ++i) {
     const double* own = y + i * n;
     double* out = rate + i * n;
     const int first = graph.start[i];
     const int last = graph.start[i + 1];
-    for_columns(n, [=](auto width, long p) {
+    for_columns(n, [=](auto width, Index p) {
       using Width = decltype(width);
       const Width mine = load_as<Width>(own + p);
       Width sum = {};
@@ -19,7 +19,7 @@ void estimate_rates(int players, int dimension, NeighbourRows graph, double k3, 
     });
     for (int e = first; e < last; ++e) {
       const double gain = -k3 * graph.weight[e];
-      for (long p = graph.neighbour[e]; p < n; p += players) out[p] += gain * (own[p] - xbar[p]);
+      for (Index p = graph.neighbour[e]; p < n; p += players) out[p] += gain * (own[p] - xbar[p]);
     }
   }
 }

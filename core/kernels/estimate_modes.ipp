@@ -2,13 +2,13 @@
 
 void factor_modes(BlockModes modes, double gamma_k3, double* inverse, double* gain) {
   const int N = modes.players;
-  const long n = modes.n;
+  const Index n = modes.n;
   set_row(N * n, inverse,
-          [=](auto width, long k) { return 1.0 / (1.0 + gamma_k3 * load_as<decltype(width)>(modes.eigenvalue + k)); });
+          [=](auto width, Index k) { return 1.0 / (1.0 + gamma_k3 * load_as<decltype(width)>(modes.eigenvalue + k)); });
   with_width(N, [=](auto width) {
     using Width = decltype(width);
     for (int i = 0; i < N; ++i) {
-      set_row_by(width, N, gain + i * N, [=](auto, long j) {
+      set_row_by(width, N, gain + i * N, [=](auto, Index j) {
         Width sum = {};
         for (int k = 0; k < N; ++k) {
           const Width share = load_as<Width>(modes.shared + k * n + j) * load_as<Width>(inverse + k * n + j);
@@ -22,8 +22,8 @@ void factor_modes(BlockModes modes, double gamma_k3, double* inverse, double* ga
 
 void solve_modes(BlockModes modes, const double* inverse, double* rhs) {
   const int N = modes.players;
-  const long n = modes.n;
-  for_columns(n, [=](auto width, long p) __attribute__((always_inline)) {
+  const Index n = modes.n;
+  for_columns(n, [=](auto width, Index p) __attribute__((always_inline)) {
     using Width = decltype(width);
     Width along[most_players_by_modes];
     const double* vector = modes.vector + p;

@@ -1,8 +1,8 @@
 // CVODE's prediction from its Nordsieck columns, and the way back; part of level.cpp.
 
 template <int order, bool scaled, bool back>
-void predict_of_order(long n, double* const* column, const double* factor) {
-  for_columns(n, [=](auto width, long p) __attribute__((always_inline)) {
+void predict_of_order(Index n, double* const* column, const double* factor) {
+  for_columns(n, [=](auto width, Index p) __attribute__((always_inline)) {
     using Width = decltype(width);
     Width z[order + 1];
     for (int j = 0; j <= order; ++j) z[j] = load_as<Width>(column[j] + p);
@@ -18,7 +18,7 @@ void predict_of_order(long n, double* const* column, const double* factor) {
 }
 
 template <int order>
-inline void predict_by(long n, double* const* column, const double* factor, bool back) {
+inline void predict_by(Index n, double* const* column, const double* factor, bool back) {
   if (back) {
     predict_of_order<order, false, true>(n, column, nullptr);
   } else if (factor == nullptr) {

@@ -11,7 +11,7 @@ inline void exponentiate_and_repeat(int players, int dimension, int neurons, dou
       const double* from = exponent + m * players;
       for (int l = 0; l < dimension; ++l) {
         set_row_by(width, players, activation + (m * dimension + l) * players,
-                   [=](auto, long i) { return load_as<Width>(from + i); });
+                   [=](auto, Index i) { return load_as<Width>(from + i); });
       }
     }
   });
@@ -30,7 +30,7 @@ void activations_diagonal(int players, int dimension, int neurons, const double*
       // -sum (y - c)^2 / rho^2 = (2 c sum y - sum y^2 - n c^2) / rho^2
       const double twice = 2.0 * centers[m];
       const double constant = n * centers[m] * centers[m];
-      set_row_by(lanes, players, exponent + m * players, [=](auto, long i) {
+      set_row_by(lanes, players, exponent + m * players, [=](auto, Index i) {
         return ((twice * load_as<Width>(sum + i) - load_as<Width>(squares + i)) - constant) * scale;
       });
     }

@@ -35,19 +35,19 @@ alignas(64) constexpr long long nothing_then_all[2 * lane_count] = {0,  0,  0,  
 
 /// Adds term(width, k) for k = 0 .. n - 1.
 template <typename Term>
-inline double sum_of(long n, Term term) {
+inline double sum_of(Index n, Term term) {
   Lanes even;
   Lanes odd;
   if (n < lane_count) {
     double lanes[lane_count] = {};
-    for (long k = 0; k < n; ++k) lanes[k] = term(0.0, k);
+    for (Index k = 0; k < n; ++k) lanes[k] = term(0.0, k);
     __builtin_memcpy(&even, lanes, sizeof lanes);
     return sum_of_lanes(even);
   }
-  const auto add_eight = [&](long k, Lanes* sums) {
+  const auto add_eight = [&](Index k, Lanes* sums) {
     for (int v = 0; v < lane_vectors; ++v) sums->part[v] += term(Vector{}, k + v * vector_length);
   };
-  long k = 0;
+  Index k = 0;
   for (; k + 2 * lane_count <= n; k += 2 * lane_count) {
     add_eight(k, &even);
     add_eight(k + lane_count, &odd);
@@ -70,19 +70,19 @@ inline double sum_of(long n, Term term) {
 }
 
 double dot(int n, const double* a, const double* b) {
-  return sum_of(n, [=](auto width, long k) {
+  return sum_of(n, [=](auto width, Index k) {
     using Width = decltype(width);
     return load_as<Width>(a + k) * load_as<Width>(b + k);
   });
 }
 
 inline void moments(int n, const double* a, double* sum, double* sum_of_squares) {
-  *sum = sum_of(n, [=](auto width, long k) { return load_as<decltype(width)>(a + k); });
+  *sum = sum_of(n, [=](auto width, Index k) { return load_as<decltype(width)>(a + k); });
   *sum_of_squares = dot(n, a, a);
 }
 
 inline double distance_squared(int n, const double* a, const double* b) {
-  return sum_of(n, [=](auto width, long k) {
+  return sum_of(n, [=](auto width, Index k) {
     using Width = decltype(width);
     const Width difference = load_as<Width>(a + k) - load_as<Width>(b + k);
     return difference * difference;
@@ -90,7 +90,7 @@ inline double distance_squared(int n, const double* a, const double* b) {
 }
 
 double weighted_square_sum(std::int64_t n, const double* x, const double* w) {
-  return sum_of(n, [=](auto width, long k) {
+  return sum_of(n, [=](auto width, Index k) {
     using Width = decltype(width);
     const Width product = load_as<Width>(x + k) * load_as<Width>(w + k);
     return product * product;

@@ -3,7 +3,7 @@
 void linear_sum(std::int64_t n, double a, const double* x, double b, const double* y, double* z) {
   // z may be x or y. The cases follow from exactness: a x - a y is computed as a (x - y), which vanishes for x = y.
   const auto set = [=](auto term) {
-    set_row(n, z, [=](auto width, long k) {
+    set_row(n, z, [=](auto width, Index k) {
       using Width = decltype(width);
       return term(load_as<Width>(x + k), load_as<Width>(y + k));
     });
@@ -32,11 +32,11 @@ void scale(std::int64_t n, double c, const double* x, double* z) {
     if (x != z) __builtin_memcpy(z, x, static_cast<unsigned long>(n) * sizeof(double));
     return;
   }
-  set_row(n, z, [=](auto width, long k) { return c * load_as<decltype(width)>(x + k); });
+  set_row(n, z, [=](auto width, Index k) { return c * load_as<decltype(width)>(x + k); });
 }
 
 void fill(std::int64_t n, double c, double* z) {
-  set_row(n, z, [=](auto width, long) { return decltype(width){} + c; });
+  set_row(n, z, [=](auto width, Index) { return decltype(width){} + c; });
 }
 
 void error_weights(std::int64_t n, double relative, double absolute, const double* y, double* weight) {
@@ -54,7 +54,7 @@ double max_norm(std::int64_t n, const double* x) {
 
 void newton_residual(std::int64_t n, double gamma, const double* f, double rl1, const double* zn1,
                      const double* correction, double* delta) {
-  set_row(n, delta, [=](auto width, long k) {
+  set_row(n, delta, [=](auto width, Index k) {
     using Width = decltype(width);
     return gamma * load_as<Width>(f + k) - (rl1 * load_as<Width>(zn1 + k) + load_as<Width>(correction + k));
   });
@@ -63,11 +63,11 @@ void newton_residual(std::int64_t n, double gamma, const double* f, double rl1, 
 void add_correction(std::int64_t n, double scale_of, const double* delta, const double* predicted, double* correction,
                     double* y) {
   // correction first: its last vector is put last, so y must not read it back
-  set_row(n, y, [=](auto width, long k) {
+  set_row(n, y, [=](auto width, Index k) {
     using Width = decltype(width);
     return load_as<Width>(predicted + k) + (load_as<Width>(correction + k) + scale_of * load_as<Width>(delta + k));
   });
-  set_row(n, correction, [=](auto width, long k) {
+  set_row(n, correction, [=](auto width, Index k) {
     using Width = decltype(width);
     return load_as<Width>(correction + k) + scale_of * load_as<Width>(delta + k);
   });

@@ -1,7 +1,7 @@
 // Vectors of numbers, and loops along rows of them; part of level.cpp.
 //
-// A row's last vector overlaps the one before instead of leaving numbers over: rows are short, 2 N D is what a player
-// has, and what is left over would cost more than the rest. Rows shorter than a vector take a shorter one.
+// Rows are short, N D numbers or N, so that what whole vectors leave over would cost more than the rest. Either a row's
+// last vector overlaps the one before, or ever shorter vectors take what is left.
 
 #if defined(__AVX512F__)
 #define MIXED_ORDER_GAME_VECTOR_BYTES 64
@@ -10,6 +10,8 @@
 #else
 #define MIXED_ORDER_GAME_VECTOR_BYTES 16
 #endif
+
+typedef std::int64_t Index;
 
 /// The level's own width.
 typedef double Vector __attribute__((vector_size(MIXED_ORDER_GAME_VECTOR_BYTES)));
@@ -39,7 +41,7 @@ inline void store(const Width& numbers, double* to) {
 
 /// Calls action with a value of the widest type that is not longer than n > 0 numbers.
 template <typename Action>
-inline void with_width(long n, Action action) {
+inline void with_width(Index n, Action action) {
   if (n >= vector_length) {
     action(Vector{});
 #if MIXED_ORDER_GAME_VECTOR_BYTES >= 64
@@ -58,24 +60,24 @@ inline void with_width(long n, Action action) {
 /// row[k] = term(k), taken for as many k at once as Width holds, n of them at least. The last vector is taken first
 /// and put last, so that term may read the row itself, at k.
 template <typename Width, typename Term>
-inline void set_row_by(Width /*width*/, long n, double* row, Term term) {
-  constexpr long length = length_of<Width>;
+inline void set_row_by(Width /*width*/, Index n, double* row, Term term) {
+  constexpr Index length = length_of<Width>;
   const Width last = term(Width{}, n - length);
-  for (long k = 0; k + length < n; k += length) store(term(Width{}, k), row + k);
+  for (Index k = 0; k + length < n; k += length) store(term(Width{}, k), row + k);
   store(last, row + n - length);
 }
 
 /// row[k] = term(width, k) for k = 0 .. n - 1.
 template <typename Term>
-inline void set_row(long n, double* row, Term term) {
+inline void set_row(Index n, double* row, Term term) {
   with_width(n, [=](auto width) { set_row_by(width, n, row, term); });
 }
 
 /// Calls action(width, p) so that the widths that begin at these p make up the columns 0 .. n - 1: whole vectors, then
 /// ever shorter ones. For actions that go down several rows and keep what belongs to their columns in registers.
 template <typename Action>
-inline void for_columns(long n, Action action) {
-  long p = 0;
+inline void for_columns(Index n, Action action) {
+  Index p = 0;
   for (; p + vector_length <= n; p += vector_length) action(Vector{}, p);
 #if MIXED_ORDER_GAME_VECTOR_BYTES >= 64
   if (p + 4 <= n) {
