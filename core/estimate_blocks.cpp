@@ -86,8 +86,21 @@ void EstimateBlocks::find_pattern(const CommunicationGraph& graph) {
       }
     }
   }
-  lower_.resize(row_.size() * at(n));
-  diagonal_.resize(at(n) * at(n));
+  player_.clear();
+  edge_.clear();
+  degree_.clear();
+  for (int k = 0; k < n; ++k) {
+    for (int a = start_[at(k)]; a < start_[at(k + 1)]; ++a) {
+      player_.push_back(order_[at(row_[at(a)])]);
+      edge_.push_back(graph.weight(order_[at(k)], player_.back()));
+    }
+    Real degree = 0.0;
+    for (int i = 0; i < n; ++i) degree += graph.weight(order_[at(k)], i);
+    degree_.push_back(degree);
+  }
+  const std::size_t padded = at((n + tile_length - 1) / tile_length * tile_length);
+  lower_.resize(row_.size() * padded);
+  diagonal_.resize(at(n) * padded);
 }
 
 void EstimateBlocks::factor(const CommunicationGraph& graph, Real gamma_k3) {
@@ -98,23 +111,23 @@ void EstimateBlocks::factor(const CommunicationGraph& graph, Real gamma_k3) {
   const int n = players_;
   const NeighbourRows rows = graph.neighbours();
   std::fill(gain_.begin(), gain_.end(), 0.0);
-  for (int k = 0; k < n; ++k) {
-    const int i = order_[at(k)];
-    Real degree = 0.0;
-    for (int e = rows.start[i]; e < rows.start[i + 1]; ++e) degree += rows.weight[e];
-    std::fill_n(diagonal_.begin() + static_cast<std::ptrdiff_t>(k) * n, n, 1.0 + gamma_k3 * degree);
-    for (int e = rows.start[i]; e < rows.start[i + 1]; ++e) {
-      const Real shared = gamma_k3 * rows.weight[e];
-      diagonal_[at(k * n + rows.neighbour[e])] += shared;
-      gain_[at(i * n + rows.neighbour[e])] = shared;
-    }
-    for (int a = start_[at(k)]; a < start_[at(k + 1)]; ++a) {
-      const Real edge = -gamma_k3 * graph.weight(i, order_[at(row_[at(a)])]);
-      std::fill_n(lower_.begin() + static_cast<std::ptrdiff_t>(a) * n, n, edge);
-    }
+  for (int i = 0; i < n; ++i) {
+    for (int e = rows.start[i]; e < rows.start[i + 1]; ++e)
+      gain_[at(i * n + rows.neighbour[e])] = gamma_k3 * rows.weight[e];
   }
-  kernels().factor_blocks(pattern(), lower_.data(), diagonal_.data());
-  for (Real& d : diagonal_) d = 1.0 / d;
+  for (int first = 0; first < n; first += tile_length) {  // blocks first .. last - 1
+    const int last = std::min(n, first + tile_length);
+    Real* lower = lower_.data() + at(first) * row_.size();
+    Real* diagonal = diagonal_.data() + first * n;
+    for (std::size_t a = 0; a < edge_.size(); ++a)
+      std::fill_n(lower + a * tile_length, tile_length, -gamma_k3 * edge_[a]);
+    for (int k = 0; k < n; ++k) {
+      Real* row = diagonal + k * tile_length;
+      std::fill_n(row, tile_length, 1.0 + gamma_k3 * degree_[at(k)]);
+      for (int j = first; j < last; ++j) row[j - first] += gain_[at(order_[at(k)] * n + j)];
+    }
+    kernels().factor_blocks(pattern(), lower, diagonal);
+  }
   kernels().solve_blocks(pattern(), 1, lower_.data(), diagonal_.data(), gain_.data());
 }
 

@@ -32,7 +32,7 @@ class EstimateBlocks {
   void find_pattern(const CommunicationGraph& graph);
   void find_modes(const CommunicationGraph& graph);
   [[nodiscard]] BlockPattern pattern() const {
-    return {players_, start_.data(), row_.data(), order_.data(), target_.data()};
+    return {players_, start_.data(), row_.data(), order_.data(), player_.data(), target_.data()};
   }
   [[nodiscard]] BlockModes modes() const {
     return {players_, dimension_ * players_, vector_.data(), eigenvalue_.data(), shared_.data()};
@@ -45,7 +45,10 @@ class EstimateBlocks {
   std::vector<int> start_;
   std::vector<int> row_;
   std::vector<int> order_;
+  std::vector<int> player_;
   std::vector<int> target_;
+  AlignedVector edge_;    // weight of each entry's edge; 0 where elimination fills in
+  AlignedVector degree_;  // sum of each eliminated player's weights
   AlignedVector lower_;
   AlignedVector diagonal_;
   // by modes

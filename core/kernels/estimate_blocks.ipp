@@ -1,60 +1,74 @@
-// L D L' of the N matrices I + gamma k3 (L + diag(a_.j)), which share one pattern, all at once; part of level.cpp.
+// L D L' of the N matrices I + gamma k3 (L + diag(a_.j)), which share one pattern; part of level.cpp.
 //
-// Number k of the factor is a row of N values, one for each block j, so every loop below runs along the blocks.
+// Number k of the factors of eight blocks is a row of eight values, so that vectors run along the blocks. Few blocks at
+// a time stay in the nearest caches from the first elimination to the last.
 
-void factor_blocks(BlockPattern pattern, double* __restrict lower, double* __restrict diagonal) {
-  const int n = pattern.players;
-  const int* target = pattern.target;
-  for (int k = 0; k < n; ++k) {
-    const double* pivot = diagonal + static_cast<Index>(k) * n;
-    const int first = pattern.start[k];
-    const int last = pattern.start[k + 1];
-    for (int a = first; a < last; ++a) {
-      double* row_a = lower + static_cast<Index>(a) * n;
-      double* own = diagonal + static_cast<Index>(pattern.row[a]) * n;
-      // l_a = v_a / d; the pairs (a, b) with b before a update v_ab -= l_a v_b, where v_b = l_b d
-      for (int b = first; b < a; ++b) {
-        const double* row_b = lower + static_cast<Index>(b) * n;
-        double* to = lower + static_cast<Index>(*target++) * n;
-        for (int j = 0; j < n; ++j) to[j] -= row_b[j] * row_a[j];
-      }
-      for (int j = 0; j < n; ++j) {
-        const double value = row_a[j];
-        row_a[j] = value / pivot[j];
-        own[j] -= row_a[j] * value;
+void factor_blocks(BlockPattern pattern, double* lower, double* diagonal) {
+  for (int lane = 0; lane < tile_length; lane += vector_length) {
+    double* L = lower + lane;
+    double* D = diagonal + lane;
+    const int* target = pattern.target;
+    for (int k = 0; k < pattern.players; ++k) {
+      const Vector inverse = 1.0 / load(D + k * tile_length);
+      store(inverse, D + k * tile_length);
+      const int first = pattern.start[k];
+      const int last = pattern.start[k + 1];
+      for (int a = first; a < last; ++a) {
+        // l_a = v_a / d; the pairs (a, b) with b before a update v_ab -= l_b v_a
+        const Vector value = load(L + a * tile_length);
+        for (int b = first; b < a; ++b) {
+          double* to = L + *target++ * tile_length;
+          store(load(to) - load(L + b * tile_length) * value, to);
+        }
+        const Vector scaled = value * inverse;
+        double* own = D + pattern.row[a] * tile_length;
+        store(load(own) - scaled * value, own);
+        store(scaled, L + a * tile_length);
       }
     }
   }
 }
 
-void solve_blocks(BlockPattern pattern, int width, const double* __restrict lower,
-                  const double* __restrict inverse_diagonal, double* __restrict rhs) {
+/// `count` coordinates of as many blocks as Width holds; L and inverse begin at the first of them, x at its player 0.
+template <typename Width, int count>
+inline void solve_columns(const BlockPattern& pattern, Index length, const double* L, const double* inverse,
+                          double* x) {
   const int n = pattern.players;
-  const int length = width * n;
+  Width sum[count];
   for (int k = 0; k < n; ++k) {
-    const double* __restrict from = rhs + static_cast<Index>(pattern.order[k]) * length;
+    const double* from = x + pattern.order[k] * length;
+    for (int h = 0; h < count; ++h) sum[h] = load_as<Width>(from + h * n);
     for (int a = pattern.start[k]; a < pattern.start[k + 1]; ++a) {
-      const double* __restrict l = lower + static_cast<Index>(a) * n;
-      double* __restrict to = rhs + static_cast<Index>(pattern.order[pattern.row[a]]) * length;
-      for (int h = 0; h < length; h += n) {
-        for (int j = 0; j < n; ++j) to[h + j] -= l[j] * from[h + j];
-      }
+      const Width l = load_as<Width>(L + a * tile_length);
+      double* to = x + pattern.player[a] * length;
+      for (int h = 0; h < count; ++h) store(load_as<Width>(to + h * n) - l * sum[h], to + h * n);
     }
   }
   for (int k = n - 1; k >= 0; --k) {
-    double* __restrict to = rhs + static_cast<Index>(pattern.order[k]) * length;
-    const double* __restrict inverse = inverse_diagonal + static_cast<Index>(k) * n;
-    for (int h = 0; h < length; h += n) {
-      for (int j = 0; j < n; ++j) to[h + j] *= inverse[j];
-    }
+    double* to = x + pattern.order[k] * length;
+    const Width pivot = load_as<Width>(inverse + k * tile_length);
+    for (int h = 0; h < count; ++h) sum[h] = load_as<Width>(to + h * n) * pivot;
     for (int a = pattern.start[k]; a < pattern.start[k + 1]; ++a) {
-      const double* __restrict l = lower + static_cast<Index>(a) * n;
-      const double* __restrict from = rhs + static_cast<Index>(pattern.order[pattern.row[a]]) * length;
-      for (int h = 0; h < length; h += n) {
-        for (int j = 0; j < n; ++j) to[h + j] -= l[j] * from[h + j];
-      }
+      const Width l = load_as<Width>(L + a * tile_length);
+      const double* from = x + pattern.player[a] * length;
+      for (int h = 0; h < count; ++h) sum[h] -= l * load_as<Width>(from + h * n);
     }
+    for (int h = 0; h < count; ++h) store(sum[h], to + h * n);
   }
+}
+
+void solve_blocks(BlockPattern pattern, int width, const double* lower, const double* inverse_diagonal, double* rhs) {
+  const Index n = pattern.players;
+  const Index entries = pattern.start[n];
+  for_columns(n, [=](auto lanes, Index j) {
+    using Width = decltype(lanes);
+    const Index tile = j / tile_length;
+    const double* L = lower + tile * entries * tile_length + j % tile_length;
+    const double* inverse = inverse_diagonal + tile * n * tile_length + j % tile_length;
+    int h = 0;
+    for (; h + 2 <= width; h += 2) solve_columns<Width, 2>(pattern, width * n, L, inverse, rhs + h * n + j);
+    if (h < width) solve_columns<Width, 1>(pattern, width * n, L, inverse, rhs + h * n + j);
+  });
 }
 
 void add_shared_signal(int players, int dimension, const double* gain, const double* shared, double* y) {

@@ -15,14 +15,17 @@ struct NeighbourRows {
   const double* weight;
 };
 
-/// Pattern of the Cholesky factors of all estimate blocks; see EstimateBlocks.
+/// Pattern of the Cholesky factors of all estimate blocks; see EstimateBlocks. The blocks' numbers lie in tiles of
+/// eight blocks: entry a (or diagonal entry k) of block j at (j / 8 * entries + a) * 8 + j % 8.
 struct BlockPattern {
   int players;
   const int* start;   ///< column k of L: entries start[k] .. start[k + 1] - 1
   const int* row;     ///< their rows, in elimination order
   const int* order;   ///< order[k] is the player eliminated k-th
+  const int* player;  ///< order[row[a]] of each entry a
   const int* target;  ///< for each column the factor entries that its pairs of rows update, see factor_blocks
 };
+constexpr int tile_length = 8;
 
 /// All estimate blocks by their eigenvectors; see EstimateBlocks. Entries lie in rows of n = N D.
 struct BlockModes {
@@ -65,7 +68,7 @@ struct Kernels {
   double (*dot)(int n, const double* a, const double* b);
 
   // Newton solver
-  /// L D L' of N blocks at once; see EstimateBlocks.
+  /// L D L' of the blocks of one tile, in place; the diagonal is replaced by its inverse.
   void (*factor_blocks)(BlockPattern pattern, double* lower, double* diagonal);
   /// Solves all blocks for right-hand sides of `width` coordinates, in place: rows of width * N entries.
   void (*solve_blocks)(BlockPattern pattern, int width, const double* lower, const double* inverse_diagonal,

@@ -464,13 +464,15 @@ TEST(SharedSignal, IsAddedToTheEstimateOfItsPlayer) {
 /// Blocks with a full pattern, eliminated in reversed order of players.
 struct FullPattern {
   int players;
-  std::vector<int> start{0}, row, order, target;
+  std::vector<int> start{0}, row, order, player, target;
 
   explicit FullPattern(int n) : players(n) {
-    const auto entry = [&](int i, int k) { return start[static_cast<std::size_t>(k)] + i - k - 1; };  // of row i > k
     for (int k = 0; k < n; ++k) {
       order.push_back(n - 1 - k);
-      for (int i = k + 1; i < n; ++i) row.push_back(i);
+      for (int i = k + 1; i < n; ++i) {
+        row.push_back(i);
+        player.push_back(n - 1 - i);
+      }
       start.push_back(static_cast<int>(row.size()));
     }
     for (int k = 0; k < n; ++k) {
@@ -479,44 +481,51 @@ struct FullPattern {
       }
     }
   }
+  /// Of row i and column k < i.
+  [[nodiscard]] int entry(int i, int k) const { return start[static_cast<std::size_t>(k)] + i - k - 1; }
+  [[nodiscard]] int entries() const { return static_cast<int>(row.size()); }
   [[nodiscard]] BlockPattern pattern() const {
-    return {players, start.data(), row.data(), order.data(), target.data()};
+    return {players, start.data(), row.data(), order.data(), player.data(), target.data()};
   }
 };
 
 TEST(Blocks, AreFactoredAndSolvedSideBySide) {
   RandomNumbers random(11);
-  for (const int n : {2, 3, 5, 8, 9, 13}) {
-    constexpr int width = 3;
-    const FullPattern full(n);
-    const int entries = n * (n - 1) / 2;
-    // block j, in elimination order: diagonally dominant, below the diagonal lower[(entry of i, k) n + j]
-    const Array lower(entries * n, random, -1.0, 1.0);
-    const Array diagonal(n * n, random, 2.0 * n, 3.0 * n);
-    const Array rhs(n * width * n, random);
-    const Array solution = on_every_level([&](const Kernels& kernel) {
-      Array l(lower);
-      Array d(diagonal);
-      Array x(rhs);
-      kernel.factor_blocks(full.pattern(), l, d);
-      for (int k = 0; k < n * n; ++k) d[k] = 1.0 / d[k];
-      kernel.solve_blocks(full.pattern(), width, l, d, x);
-      return x;
-    });
-    const auto of_player = [&](const Array& rows, int k, int h, int j) {  // unknown eliminated k-th
-      return rows[full.order[static_cast<std::size_t>(k)] * width * n + h * n + j];
-    };
-    for (int j = 0; j < n; ++j) {
-      for (int h = 0; h < width; ++h) {
-        for (int i = 0; i < n; ++i) {
-          double sum = diagonal[i * n + j] * of_player(solution, i, h, j);
-          for (int k = 0; k < n; ++k) {
-            if (k == i) continue;
-            const int low = std::min(i, k);
-            const int entry = full.start[static_cast<std::size_t>(low)] + std::max(i, k) - low - 1;
-            sum += lower[entry * n + j] * of_player(solution, k, h, j);
+  for (const int n : {2, 3, 5, 8, 9, 13, 20}) {
+    for (const int width : {1, 2, 3}) {
+      const FullPattern full(n);
+      const int tiles = (n + tile_length - 1) / tile_length;
+      const auto place = [](int number, int of, int j) {
+        return (j / tile_length * of + number) * tile_length + j % tile_length;
+      };
+      // in elimination order, diagonally dominant
+      const Array lower(tiles * full.entries() * tile_length, random, -1.0, 1.0);
+      const Array diagonal(tiles * n * tile_length, random, 2.0 * n, 3.0 * n);
+      const Array rhs(n * width * n, random);
+      const Array solution = on_every_level([&](const Kernels& kernel) {
+        Array l(lower);
+        Array d(diagonal);
+        Array x(rhs);
+        for (int tile = 0; tile < tiles; ++tile) {
+          kernel.factor_blocks(full.pattern(), l + tile * full.entries() * tile_length, d + tile * n * tile_length);
+        }
+        kernel.solve_blocks(full.pattern(), width, l, d, x);
+        return x;
+      });
+      const auto of_player = [&](const Array& rows, int k, int h, int j) {  // unknown eliminated k-th
+        return rows[full.order[static_cast<std::size_t>(k)] * width * n + h * n + j];
+      };
+      for (int j = 0; j < n; ++j) {
+        for (int h = 0; h < width; ++h) {
+          for (int i = 0; i < n; ++i) {
+            double sum = diagonal[place(i, n, j)] * of_player(solution, i, h, j);
+            for (int k = 0; k < n; ++k) {
+              if (k == i) continue;
+              const int entry = full.entry(std::max(i, k), std::min(i, k));
+              sum += lower[place(entry, full.entries(), j)] * of_player(solution, k, h, j);
+            }
+            EXPECT_NEAR(sum, of_player(rhs, i, h, j), 1e-13) << n << ", " << width;
           }
-          EXPECT_NEAR(sum, of_player(rhs, i, h, j), 1e-13) << n;
         }
       }
     }
