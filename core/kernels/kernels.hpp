@@ -36,7 +36,7 @@ struct BlockModes {
   const double* shared;      ///< row k: product of the k-th eigenvectors with a_.j
 };
 /// More would not pay, see EstimateBlocks.
-constexpr int most_players_by_modes = 16;
+constexpr int most_players_by_modes = 8;
 
 struct Kernels {
   const char* level;  ///< name of the instruction set

@@ -535,6 +535,7 @@ TEST(Blocks, AreFactoredAndSolvedSideBySide) {
 TEST(Blocks, AreSolvedByTheirModes) {
   RandomNumbers random(16);
   for (const auto& [N, dimension, neurons] : loop_sizes) {
+    if (N > most_players_by_modes) continue;
     const int n = N * dimension;
     const Array vector(N * N * n, random), eigenvalue(N * n, random, 0.0, 9.0), shared(N * n, random),
         rhs(N * n, random);
