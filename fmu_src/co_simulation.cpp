@@ -26,9 +26,7 @@ void CoSimulation::start(Real t, Tolerances tolerances, std::vector<Real> acting
   acting_ = std::move(acting);
 }
 
-Standing CoSimulation::standing() const {
-  return {integrator_.time(), integrator_.state(), &integrator_.modes(), integrator_.statistics()};
-}
+Standing CoSimulation::standing() const { return {integrator_.time(), integrator_.state(), &integrator_.modes()}; }
 
 Change CoSimulation::change_to(std::span<const Real> settings, std::size_t parameters) const {
   if (same_bits(settings, acting_)) return Change::none;

@@ -24,6 +24,7 @@ class CoSimulation {
   /// Begins at time t with the loop's initial state.
   void start(Real t, Tolerances tolerances, std::vector<Real> acting);
   [[nodiscard]] Standing standing() const;
+  [[nodiscard]] Statistics statistics() const { return integrator_.statistics(); }
 
   /// What differs, bit for bit, from the settings that act; the numbers of parameters come before those of inputs.
   [[nodiscard]] Change change_to(std::span<const Real> settings, std::size_t parameters) const;

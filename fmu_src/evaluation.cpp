@@ -33,6 +33,7 @@ void Evaluation::prepare(Stage stage, Settings& settings, const Standing& standi
   switch (stage) {
     case Stage::settings:
     case Stage::state:
+    case Stage::statistics:
       break;
     case Stage::input:
       settings.input.values(standing.time, d_ext_as_set_.data());
@@ -84,7 +85,6 @@ View Evaluation::view(const Settings& settings, const Standing& standing) const 
   view.rate = rate_.data();
   view.signals = &signals_;
   view.x_star = equilibrium_valid_ ? x_star_.data() : nullptr;
-  view.statistics = standing.statistics;
   return view;
 }
 

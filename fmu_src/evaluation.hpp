@@ -13,7 +13,6 @@ struct Standing {
   Real time = 0.0;
   const Real* state = nullptr;
   const Modes* modes = nullptr;
-  Statistics statistics;
 };
 
 class Evaluation {

@@ -39,9 +39,10 @@ class FloatingPointEnvironment {
  public:
   FloatingPointEnvironment() {
 #ifdef MIXED_ORDER_GAME_SSE
+    // reading is cheap, writing is not
     asm volatile("fnstcw %0" : "=m"(host_x87_));
-    asm volatile("fldcw %0" : : "m"(default_x87));
-    _mm_setcsr(default_control);
+    if (host_x87_ != default_x87) asm volatile("fldcw %0" : : "m"(default_x87));
+    if ((host_ & ~flags) != default_control) _mm_setcsr(default_control);
 #else
     std::fegetenv(&host_);
     std::fesetenv(FE_DFL_ENV);
@@ -49,8 +50,8 @@ class FloatingPointEnvironment {
   }
   ~FloatingPointEnvironment() {
 #ifdef MIXED_ORDER_GAME_SSE
-    _mm_setcsr(host_);
-    asm volatile("fldcw %0" : : "m"(host_x87_));
+    if (_mm_getcsr() != host_) _mm_setcsr(host_);
+    if (host_x87_ != default_x87) asm volatile("fldcw %0" : : "m"(host_x87_));
 #else
     std::fesetenv(&host_);
 #endif
@@ -60,6 +61,7 @@ class FloatingPointEnvironment {
 
  private:
 #ifdef MIXED_ORDER_GAME_SSE
+  static constexpr unsigned flags = 0x3f;                // of exceptions that have occurred: they change no result
   static constexpr unsigned default_control = 0x1f80;    // all exceptions masked, to nearest, no flush to zero
   static constexpr unsigned short default_x87 = 0x037f;  // the same, with extended precision
   unsigned host_ = _mm_getcsr();

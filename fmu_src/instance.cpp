@@ -55,7 +55,13 @@ Instance::Instance(Model model, Interface interface)
 Standing Instance::standing() const {
   if (co_simulation_) return co_simulation_->standing();
   if (model_exchange_) return model_exchange_->standing();
-  return {.time = experiment_.start_time, .state = initial_state_.data(), .modes = &initial_modes_, .statistics = {}};
+  return {.time = experiment_.start_time, .state = initial_state_.data(), .modes = &initial_modes_};
+}
+
+Statistics Instance::statistics() const {
+  if (co_simulation_) return co_simulation_->statistics();
+  if (model_exchange_) return model_exchange_->statistics();
+  return {};
 }
 
 namespace {
@@ -136,13 +142,27 @@ void Instance::refuse(std::uint32_t reference, Type type) const {
               ", not " + std::string(name_of(type)));
 }
 
-void Instance::get(Type type, std::span<const std::uint32_t> references, Real* values) {
-  const ModelVariables& variables = model_.variables;
+/// What the variables need. Importers ask for the same ones at every communication point: those are not looked up
+/// again.
+const Instance::Stages& Instance::stages_of(Type type, std::span<const std::uint32_t> references) {
+  if (type == known_type_ && references.size() == known_references_.size() &&
+      std::equal(references.data(), references.data() + references.size(), known_references_.data())) {
+    return known_stages_;
+  }
   Stages needed{};
   for (const std::uint32_t reference : references) {
-    needed[static_cast<std::size_t>(variables.variable(known(reference, type)).stage)] = true;
+    needed[static_cast<std::size_t>(model_.variables.variable(known(reference, type)).stage)] = true;
   }
-  const View source = evaluation_.view(settings_, prepare(needed));
+  known_references_.assign(references.begin(), references.end());
+  known_type_ = type;
+  return known_stages_ = needed;
+}
+
+void Instance::get(Type type, std::span<const std::uint32_t> references, Real* values) {
+  const ModelVariables& variables = model_.variables;
+  const Stages& needed = stages_of(type, references);
+  View source = evaluation_.view(settings_, prepare(needed));
+  if (needed[static_cast<std::size_t>(Stage::statistics)]) source.statistics = statistics();
   scratch_.resize(references.size());
   for (std::size_t k = 0; k < references.size(); ++k) {
     const auto reference = static_cast<int>(references[k]);

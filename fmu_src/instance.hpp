@@ -42,7 +42,7 @@ class Instance {
   [[nodiscard]] Phase phase() const { return phase_; }
   /// Of the last communication point, or as the importer set it, s.
   [[nodiscard]] Real time() const { return standing().time; }
-  [[nodiscard]] Statistics statistics() const { return standing().statistics; }
+  [[nodiscard]] Statistics statistics() const;
 
   void setup_experiment(const Experiment& experiment);
   void enter_initialization();
@@ -89,6 +89,7 @@ class Instance {
   /// The reference of a variable of this type; anything else is refused.
   [[nodiscard]] int known(std::uint32_t reference, Type type) const;
   [[noreturn]] void refuse(std::uint32_t reference, Type type) const;
+  const Stages& stages_of(Type type, std::span<const std::uint32_t> references);
   [[nodiscard]] Standing standing() const;
   [[nodiscard]] Tolerances tolerances() const;
   void act();
@@ -116,6 +117,10 @@ class Instance {
   std::unique_ptr<CoSimulation> co_simulation_;
   std::optional<ModelExchange> model_exchange_;
   std::vector<Real> scratch_;
+  // the variables that were read last
+  Type known_type_{};
+  std::vector<std::uint32_t> known_references_;
+  Stages known_stages_{};
 };
 
 }  // namespace mixed_order_game

@@ -10,11 +10,7 @@ ModelExchange::ModelExchange(Evaluation& evaluation, Point start) : evaluation_(
   evaluation_.moved();
 }
 
-Standing ModelExchange::standing() const {
-  Statistics statistics;
-  statistics.events = point_.events;
-  return {point_.time, point_.state.data(), &point_.modes, statistics};
-}
+Standing ModelExchange::standing() const { return {point_.time, point_.state.data(), &point_.modes}; }
 
 void ModelExchange::set_time(Real t) {
   if (t == point_.time) return;

@@ -23,6 +23,7 @@ class ModelExchange {
   ModelExchange(Evaluation& evaluation, Point start);
 
   [[nodiscard]] Standing standing() const;
+  [[nodiscard]] Statistics statistics() const { return {.events = point_.events}; }
   void set_time(Real t);
   void set_state(std::span<const Real> state);
 

@@ -75,15 +75,6 @@ template <auto Member>
 void write_initial(Settings& settings, int slot, Real value) {
   (settings.parameters.initial.*Member)[at(slot)] = value;
 }
-template <auto Member>
-Real read_signal(const View& view, int slot) {
-  return (view.signals->*Member)[at(slot)];
-}
-// Parts of the state vector and of its rate, by the layout's offset.
-template <auto Offset>
-Real read_state(const View& view, int slot) {
-  return view.state[(view.loop->layout().*Offset)() + slot];
-}
 template <auto Offset>
 Real read_rate(const View& view, int slot) {
   return view.rate[(view.loop->layout().*Offset)() + slot];
@@ -230,7 +221,8 @@ class ModelVariables::Builder {
     family.count = static_cast<int>(elements.size());
     const int number = static_cast<int>(table_.families_.size());
     for (const auto& [slot, index] : elements) {
-      table_.variables_.push_back({number, slot, index, family.type, family.stage, family.read});
+      const int state = family.state >= 0 ? family.state + slot : -1;
+      table_.variables_.push_back({number, slot, index, family.type, family.stage, state, family.signal, family.read});
     }
     table_.families_.push_back(std::move(family));
   }
@@ -446,7 +438,6 @@ class ModelVariables::Builder {
          .nominal = 1.0,
          .stage = Stage::state,
          .state = layout_.x(),
-         .read = read_state<&StateLayout::x>,
          .read_along = read_state_along<&StateLayout::x>},
         actions());
     x_ = last_family();
@@ -458,7 +449,6 @@ class ModelVariables::Builder {
          .nominal = 1.0,
          .stage = Stage::state,
          .state = layout_.reference(),
-         .read = read_state<&StateLayout::reference>,
          .read_along = read_state_along<&StateLayout::reference>},
         actions(2));
     v_ = last_family();
@@ -468,7 +458,7 @@ class ModelVariables::Builder {
          .declared_type = "Drive",
          .unit = drive,
          .stage = Stage::signals,
-         .read = read_signal<&Signals::control>,
+         .signal = &Signals::control,
          .read_along = [](const View&, const Tangent& tangent, int slot) { return tangent.control[slot]; }},
         actions());
     add({.name = "nash_error",
@@ -509,7 +499,6 @@ class ModelVariables::Builder {
          .nominal = 1.0,
          .stage = Stage::state,
          .state = layout_.reference(),
-         .read = read_state<&StateLayout::reference>,
          .read_along = read_state_along<&StateLayout::reference>},
         actions(1));
     const int z = last_family();
@@ -523,7 +512,6 @@ class ModelVariables::Builder {
            .nominal = 1.0,
            .stage = Stage::state,
            .state = layout_.estimates(),
-           .read = read_state<&StateLayout::estimates>,
            .read_along = read_state_along<&StateLayout::estimates>},
           estimates());
       y = last_family();
@@ -534,7 +522,6 @@ class ModelVariables::Builder {
            .nominal = W_nominal,
            .stage = Stage::state,
            .state = layout_.weights(),
-           .read = read_state<&StateLayout::weights>,
            .read_along = read_state_along<&StateLayout::weights>},
           weights());
       W = last_family();
@@ -558,14 +545,14 @@ class ModelVariables::Builder {
          .declared_type = "Drive",
          .unit = drive,
          .stage = Stage::signals,
-         .read = read_signal<&Signals::robust>},
+         .signal = &Signals::robust},
         actions());
     add({.name = "nn",
          .description = "Output of the neural network",
          .declared_type = "Drive",
          .unit = drive,
          .stage = Stage::signals,
-         .read = read_signal<&Signals::network>},
+         .signal = &Signals::network},
         actions());
     add({.name = "cost",
          .description = "Cost f_i(x)",
@@ -615,7 +602,7 @@ class ModelVariables::Builder {
            .variability = Variability::discrete,
            .declared_type = "Count",
            .range = Range::non_negative,
-           .stage = Stage::state,
+           .stage = Stage::statistics,
            .read = read},
           one());
     };

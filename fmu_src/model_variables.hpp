@@ -59,7 +59,10 @@ struct Family {
   int derivative_of = -1;  ///< family of states of which this one holds the derivatives, element by element
   int state = -1;          ///< of states: position of slot 0 in the state vector
 
-  /// Value of the element at a slot; Integer and Boolean values are exact in a Real.
+  AlignedVector Signals::* signal = nullptr;  ///< the vector of signals that holds the elements at their slots
+
+  /// Value of the element at a slot, of other families than states and signals; Integer and Boolean values are exact
+  /// in a Real.
   Real (*read)(const View& view, int slot) = nullptr;
   /// Null when it cannot be set.
   void (*write)(Settings& settings, int slot, Real value) = nullptr;
@@ -78,6 +81,8 @@ struct Variable {
   // the family's, side by side for the calls that importers make after every step
   Type type = Type::real;
   Stage stage = Stage::settings;
+  int state = -1;  ///< position in the state vector
+  AlignedVector Signals::* signal = nullptr;
   Real (*read)(const View& view, int slot) = nullptr;
 };
 
@@ -101,6 +106,8 @@ class ModelVariables {
 
   [[nodiscard]] Real read(int reference, const View& view) const {
     const Variable& one = variable(reference);
+    if (one.state >= 0) return view.state[one.state];
+    if (one.signal != nullptr) return (view.signals->*one.signal)[at(one.slot)];
     return one.read(view, one.slot);
   }
 

@@ -27,6 +27,7 @@ enum class Stage {
   input,        ///< d_ext
   state,        ///< time and state
   signals,      ///< signals and rates of the closed loop
+  statistics,   ///< the work done
   equilibrium,  ///< state and x_star
 };
 
