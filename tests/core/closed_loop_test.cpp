@@ -152,6 +152,27 @@ TEST_P(ClosedLoopOfRandomGame, WeightNormsAreThoseOfTheColumns) {
   }
 }
 
+TEST_P(ClosedLoopOfRandomGame, EventFunctionsBelongToTheirStateWhateverTheSignalsHeld) {
+  if (!game_.robust) return;
+  std::vector<std::vector<int>> on_sphere;
+  LoopState<Real> state = random_state(game_, random_, on_sphere);
+  on_sphere[0][0] = 1;
+  const Modes modes = modes_of(on_sphere);
+  LoopSignals<Real> expected;
+  reference_rate(game_, 0.0, state, rows_of(game_.players, game_.dimension), on_sphere, &expected);
+  const std::vector<Real> error = flat_actions(expected.error);
+  const std::vector<Real> network = flat_actions(expected.network);
+  std::vector<Real> norm2(modes.size());
+  loop_.weight_norms(state.flat().data(), norm2.data());
+  Signals signals(loop_.shape());  // of no state yet
+  std::vector<Real> values(modes.size());
+  loop_.event_functions(state.flat().data(), modes, signals, values.data());
+  for (std::size_t p = 0; p < modes.size(); ++p) {
+    const Real value = modes[p] != 0 ? -error[p] * network[p] : norm2[p] / game_.W_max - 1.0;
+    EXPECT_NEAR(values[p], value, 2e-12 * (1.0 + std::abs(value))) << "column " << p;
+  }
+}
+
 INSTANTIATE_TEST_SUITE_P(Assorted, ClosedLoopOfRandomGame, ::testing::ValuesIn(assorted_recipes()),
                          [](const auto& instance) { return "seed" + std::to_string(instance.param.seed); });
 
