@@ -22,10 +22,12 @@ from numpy.typing import ArrayLike, NDArray
 from .errors import SimulationError
 from .model import Model, Value, Variable, check_value, read_model
 from .results import Result
+from .schedule import Disturbance
 from .version import package_version
 
-Inputs = Callable[[float], ArrayLike] | ArrayLike
-"""External disturbance d_ext: a function of the time in s giving (N, D), or an array (N, D) or (T, N, D)."""
+Inputs = Disturbance | Callable[[float], ArrayLike] | ArrayLike
+"""External disturbance d_ext: rows over time, a function of the time in s giving
+(N, D), or an array (N, D) or (T, N, D)."""
 
 Changes = Mapping[float, Mapping[str, Value]]
 """Tunable parameters and inputs to set during the run: time in s -> name -> value."""
@@ -132,11 +134,15 @@ class Simulator:
         tolerance: relative tolerance of the integrator.
         outputs: names to record; x stands for every x[i,l]. Default: all outputs and locals but y and W.
             x_star is always recorded.
-        inputs: external disturbance d_ext, held over each step at the value of the step's beginning: a
-            function of the time in s giving (N, D), or an array (N, D), or (T, N, D) with one row a sample.
-        changes: tunable parameters and inputs set on the way, each before the step that begins at its time;
-            a time between two samples becomes a communication point of its own. A sample at the time of a
-            change is taken before it.
+        inputs: external disturbance d_ext: a function of the time in s giving (N, D), or an array (N, D), or
+            (T, N, D) with one row a sample, each held over each communication step at the value of its
+            beginning; or a schedule.Disturbance, whose rows act exactly at their times, held or straight
+            between them.
+        changes: tunable parameters and inputs set on the way, each before the step that begins at its time.
+            A sample at the time of a change is taken before it.
+
+        The times of changes and of a Disturbance's rows become communication points when they lie between two
+        samples; samples are taken at the same times as without them.
 
         Raises VariableError for a variable that does not exist or does not take its value, SimulationError
         for times, shapes and tolerances that make no sense and for whatever the FMU refuses.
@@ -148,21 +154,28 @@ class Simulator:
             raise SimulationError(f"tolerance = {tolerance:g} is not between 0 and 1")
         parameters = self.model.start_values(start_values)
         schedule = _schedule(self.model, changes or {}, time)
-        disturbance = _Disturbance(self.model, inputs, len(time))
+        disturbance = _disturbance(self.model, inputs, time)
+        if inputs is not None:
+            _check_set_once(self.model, [start_values or {}, *schedule.values()])
         recorder = _Recorder(self._slave, self._recorded(outputs), len(time))
+        points = np.union1d(time, [*schedule, *disturbance.times]).tolist()
 
         try:
             self._initialize({name: parameters[name] for name in start_values or {}}, time, tolerance)
-            disturbance.set(self._slave, 0, start_time)
+            disturbance.set(self._slave, points[0])
             self._slave.exitInitializationMode()
             recorder.read(0)
-            for sample in range(1, len(time)):
-                begin, end = float(time[sample - 1]), float(time[sample])
-                disturbance.set(self._slave, sample - 1, begin)
-                self._step(begin, end, schedule)
-                recorder.read(sample)
-                if progress is not None:
-                    progress(end)
+            sample = 1
+            for begin, end in pairwise(points):
+                disturbance.set(self._slave, begin)
+                if begin in schedule:
+                    self._set(schedule[begin])
+                self._slave.doStep(begin, end - begin)
+                if end == time[sample]:
+                    recorder.read(sample)
+                    sample += 1
+                    if progress is not None:
+                        progress(end)
             self._slave.terminate()
         except FMICallException as error:
             raise SimulationError(self._said() or str(error)) from error
@@ -200,14 +213,6 @@ class Simulator:
             if chosen:
                 references = [variables[name].reference for name in chosen]
                 getattr(self._slave, setter)(references, list(chosen.values()))
-
-    def _step(self, begin: float, end: float, schedule: Mapping[float, Mapping[str, Value]]) -> None:
-        """Steps from begin to end, through the changes at begin and between."""
-        points = [begin, *(when for when in schedule if begin < when < end), end]
-        for now, then in pairwise(points):
-            if now in schedule:
-                self._set(schedule[now])
-            self._slave.doStep(now, then - now)
 
     def _recorded(self, outputs: Sequence[str] | None) -> list[Variable]:
         if outputs is not None:
@@ -266,42 +271,95 @@ class _Recorder:
         return {variable.name: columns[variable.name] for variable in self.variables}
 
 
-class _Disturbance:
-    """The external disturbance d_ext at the beginning of every step."""
+class _Inputs:
+    """The external disturbance d_ext at the communication points; this one is none."""
 
-    def __init__(self, model: Model, inputs: Inputs | None, samples: int) -> None:
-        self._function: Callable[[float], ArrayLike] | None = None
-        self._array: NDArray[np.float64] | None = None
+    def __init__(self, model: Model, times: Sequence[float] = ()) -> None:
+        self.times = times  # communication points that the disturbance asks for
         self._shape = (model.players, model.dimension)
         names = model.indexed("d_ext")
         self._references = _references([names[index] for index in sorted(names)])
         self._buffer = (c_double * len(names))()
-        if inputs is None:
-            return
-        if callable(inputs):
-            self._function = inputs
-            return
-        array = np.asarray(inputs, dtype=np.float64)
-        if array.shape not in (self._shape, (samples, *self._shape)):
-            raise SimulationError(
-                f"inputs has the shape {array.shape}, not {self._shape} or {(samples, *self._shape)}"
-            )
-        _check_finite(array, "inputs")
-        self._array = np.broadcast_to(array, (samples, *self._shape))
 
-    def set(self, slave: Any, sample: int, time: float) -> None:
-        """Set the inputs for the step that begins with this sample; nothing if there are none."""
-        if self._function is not None:
-            value = np.asarray(self._function(time), dtype=np.float64)
-            if value.shape != self._shape:
-                raise SimulationError(f"inputs({time:g}) has the shape {value.shape}, not {self._shape}")
-            _check_finite(value, f"inputs({time:g})")
-        elif self._array is not None:
-            value = self._array[sample]
-        else:
-            return
-        self._buffer[:] = cast("Any", value.ravel().tolist())
+    def set(self, slave: Any, time: float) -> None:
+        """Set the inputs for the step that begins at a communication point."""
+
+    def _give(self, slave: Any, values: NDArray[np.float64]) -> None:
+        self._buffer[:] = cast("Any", values.ravel().tolist())
         slave.fmi2SetReal(slave.component, self._references, len(self._buffer), self._buffer)
+
+
+class _Function(_Inputs):
+    """A function of the time in s, asked at every communication point."""
+
+    def __init__(self, model: Model, function: Callable[[float], ArrayLike]) -> None:
+        super().__init__(model)
+        self._function = function
+
+    def set(self, slave: Any, time: float) -> None:
+        value = np.asarray(self._function(time), dtype=np.float64)
+        if value.shape != self._shape:
+            raise SimulationError(f"inputs({time:g}) has the shape {value.shape}, not {self._shape}")
+        _check_finite(value, f"inputs({time:g})")
+        self._give(slave, value)
+
+
+class _Rows(_Inputs):
+    """Rows (T, N, D), each held from its time on, or changing at a rate (T, N, D) until the next one."""
+
+    def __init__(
+        self,
+        model: Model,
+        times: Sequence[float],
+        values: NDArray[np.float64],
+        rates: NDArray[np.float64] | None = None,
+    ) -> None:
+        super().__init__(model, times)
+        self._rows = dict(zip(times, range(len(times)), strict=True))
+        self._values = values
+        self._rates = rates
+        self._orders = (c_int * len(self._buffer))(*[1] * len(self._buffer))
+
+    def set(self, slave: Any, time: float) -> None:
+        row = self._rows.get(time)
+        if row is None:
+            return
+        self._give(slave, self._values[row])
+        if self._rates is not None:
+            self._buffer[:] = cast("Any", self._rates[row].ravel().tolist())
+            slave.fmi2SetRealInputDerivatives(
+                slave.component, self._references, len(self._buffer), self._orders, self._buffer
+            )
+
+
+def _disturbance(model: Model, inputs: Inputs | None, samples: NDArray[np.float64]) -> _Inputs:
+    """The inputs of a run, their shapes and values checked as far as they are known."""
+    if inputs is None:
+        return _Inputs(model)
+    shape = (model.players, model.dimension)
+    if isinstance(inputs, Disturbance):
+        return _rows_of(model, inputs, samples)
+    if callable(inputs):
+        return _Function(model, inputs)
+    array = np.asarray(inputs, dtype=np.float64)
+    if array.shape not in (shape, (len(samples), *shape)):
+        raise SimulationError(f"inputs has the shape {array.shape}, not {shape} or {(len(samples), *shape)}")
+    _check_finite(array, "inputs")
+    return _Rows(model, samples.tolist(), np.broadcast_to(array, (len(samples), *shape)))
+
+
+def _rows_of(model: Model, inputs: Disturbance, samples: NDArray[np.float64]) -> _Rows:
+    """What is in force at the start, and every row between start and stop."""
+    shape = (model.players, model.dimension)
+    if inputs.values.shape[1:] != shape:
+        raise SimulationError(f"a row of inputs has the shape {inputs.values.shape[1:]}, not {shape}")
+    times = _on_samples(inputs.time, samples)
+    last = np.diff(times, append=np.inf) > 0.0  # of rows that rounding put on one sample
+    moved = Disturbance(times[last], inputs.values[last], inputs.linear)
+    start, stop = samples[[0, -1]]
+    points = [float(start), *moved.time[(start < moved.time) & (moved.time < stop)].tolist()]
+    values, rates = zip(*map(moved.at, points), strict=True)
+    return _Rows(model, points, np.array(values), np.array(rates) if inputs.linear else None)
 
 
 def _samples(start: float, stop: float, step: float) -> NDArray[np.float64]:
@@ -324,17 +382,33 @@ def _schedule(model: Model, changes: Changes, samples: NDArray[np.float64]) -> d
     """The changes by time, their values checked; a time that is nearly a sample's becomes that sample's."""
     schedule: dict[float, dict[str, Value]] = {}
     start, stop = float(samples[0]), float(samples[-1])
-    for when in sorted(changes):
-        nearest = float(samples[np.argmin(np.abs(samples - when))])
-        point = nearest if abs(when - nearest) <= 1e-9 * (stop - start) else float(when)
+    when = np.array(sorted(changes), dtype=np.float64)
+    for time, point in zip(when.tolist(), _on_samples(when, samples).tolist(), strict=True):
         if not start <= point < stop:
-            raise SimulationError(f"the change at {when:g} s is outside [{start:g}, {stop:g}) s")
+            raise SimulationError(f"the change at {time:g} s is outside [{start:g}, {stop:g}) s")
         values = {
             name: check_value(model.variable(name), value, during_run=True)
-            for name, value in changes[when].items()
+            for name, value in changes[time].items()
         }
         schedule.setdefault(point, {}).update(values)
     return schedule
+
+
+def _on_samples(times: NDArray[np.float64], samples: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The times, those of a sample put right where rounding has moved them."""
+    after = np.clip(np.searchsorted(samples, times), 1, len(samples) - 1)
+    before = after - 1
+    nearest = np.where(times - samples[before] < samples[after] - times, samples[before], samples[after])
+    span, largest = samples[-1] - samples[0], np.abs(samples).max()
+    slack = 1e-9 * span + 4.0 * np.spacing(largest)
+    return np.where(np.abs(times - nearest) <= slack, nearest, times)
+
+
+def _check_set_once(model: Model, values: Iterable[Mapping[str, Value]]) -> None:
+    inputs = {variable.name for variable in model.indexed("d_ext").values()}
+    twice = next((name for each in values for name in each if name in inputs), None)
+    if twice is not None:
+        raise SimulationError(f"{twice} is set twice: by inputs and by start_values or changes")
 
 
 def _references(variables: Iterable[Variable]) -> Any:

@@ -170,23 +170,34 @@ class Disturbance:
     """External disturbance d_ext over time, to be given as inputs to a run: a function of the time in s.
 
     Between two rows it holds the earlier one, or goes straight if linear. 0 before the first row; the last
-    row holds on.
+    row holds on. Raises ScheduleError for times that do not go up, values that are not finite, other shapes.
     """
 
     time: FloatArray  # (T,), s, going up
     values: FloatArray  # (T, N, D)
     linear: bool = False
 
+    def __post_init__(self) -> None:
+        _check_shapes(self.time, self.values)
+        if not np.all(np.isfinite(self.time)) or np.any(np.diff(self.time) <= 0.0):
+            raise ScheduleError("the times of the disturbance do not go up")
+        if not np.all(np.isfinite(self.values)):
+            raise ScheduleError("the disturbance must be finite")
+
     def __call__(self, time: float) -> FloatArray:
         """d_ext (N, D) at a time."""
-        slack = 1e-9 * (1.0 + abs(time))  # a communication point that rounding put before its row
-        row = int(np.searchsorted(self.time, time + slack, side="right")) - 1
+        return self.at(time)[0]
+
+    def at(self, time: float) -> tuple[FloatArray, FloatArray]:
+        """d_ext (N, D) at a time, and its rate in 1/s from there on."""
+        row = int(np.searchsorted(self.time, time, side="right")) - 1
+        nothing = np.zeros(self.values.shape[1:])
         if row < 0:
-            return np.zeros(self.values.shape[1:])
+            return nothing, nothing
         if not self.linear or row == len(self.time) - 1:
-            return np.asarray(self.values[row])
-        part = max(0.0, (time - self.time[row]) / (self.time[row + 1] - self.time[row]))
-        return np.asarray((1.0 - part) * self.values[row] + part * self.values[row + 1])
+            return self.values[row], nothing
+        rate = (self.values[row + 1] - self.values[row]) / (self.time[row + 1] - self.time[row])
+        return self.values[row] + rate * (time - self.time[row]), rate
 
 
 def read_disturbance(path: Path | str, model: Model, *, linear: bool = False) -> Disturbance:
@@ -222,8 +233,7 @@ def _disturbance(path: Path, model: Model, *, linear: bool) -> Disturbance:
 def write_disturbance(path: Path | str, time: ArrayLike, values: ArrayLike) -> Path:
     """Write d_ext, time (T,) in s and values (T, N, D), as the CSV file that read_disturbance reads."""
     times, array = np.asarray(time, dtype=np.float64), np.asarray(values, dtype=np.float64)
-    if times.ndim != 1 or array.ndim != 3 or len(array) != len(times):  # noqa: PLR2004 - (T, N, D)
-        raise ScheduleError(f"time {times.shape} and values {array.shape} are not (T,) and (T, N, D)")
+    _check_shapes(times, array)
     _, players, dimension = array.shape
     names = [f"d_ext[{i},{k}]" for i in range(1, players + 1) for k in range(1, dimension + 1)]
     rows = np.column_stack([times, array.reshape(len(times), -1)])
@@ -237,6 +247,11 @@ def write_graph_schedule(path: Path | str, schedule: GraphSchedule) -> Path:
     names = list(dict.fromkeys(name for _, weights in schedule.entries for name in weights))
     rows = [[time, *(weights.get(name, "") for name in names)] for time, weights in schedule.entries]
     return _write_table(Path(path), names, rows)
+
+
+def _check_shapes(time: FloatArray, values: FloatArray) -> None:
+    if time.ndim != 1 or values.ndim != 3 or len(values) != len(time):  # noqa: PLR2004 - (T, N, D)
+        raise ScheduleError(f"time {time.shape} and values {values.shape} are not (T,) and (T, N, D)")
 
 
 def _read_table(path: Path) -> tuple[list[str], list[tuple[float, list[float]]]]:

@@ -150,6 +150,10 @@ def test_interrupted_run_leaves_the_simulator_usable(simulator: Simulator) -> No
         ({"inputs": [[1.0]]}, "inputs has the shape (1, 1), not (5, 2) or (1001, 5, 2)"),
         ({"inputs": [[float("nan")] * 2] * 5}, "inputs must be finite"),
         ({"inputs": lambda _: [0.0]}, "inputs(0) has the shape (1,), not (5, 2)"),
+        (
+            {"inputs": np.zeros((5, 2)), "changes": {1.0: {"d_ext[2,1]": 1.0}}},
+            "d_ext[2,1] is set twice: by inputs and by start_values or changes",
+        ),
         ({"changes": {20.0: {"k1": 1.0}}}, "the change at 20 s is outside [0, 20) s"),
     ],
 )

@@ -1,11 +1,13 @@
 """Graphs that switch and disturbances from files, down to what the FMU does with them."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
-from mixed_order_game import Model, Simulator, read_model
+from mixed_order_game import Model, Simulator, default_game, read_model
 from mixed_order_game.graphs import graph_of_text
 from mixed_order_game.schedule import (
     Disturbance,
@@ -17,6 +19,9 @@ from mixed_order_game.schedule import (
     write_disturbance,
     write_graph_schedule,
 )
+from tests.oracle.closed_loop import initial_state, state_rate, unpack
+from tests.oracle.game import read_game
+from tests.oracle.simulate import simulate
 
 
 @pytest.fixture(scope="module")
@@ -103,7 +108,7 @@ def test_disturbance(fmu: Path, tmp_path: Path, model: Model) -> None:
     held = read_disturbance(path, model)
     assert held(0.1).tolist() == np.zeros((5, 2)).tolist()
     assert held(0.2)[0, 1] == 30.0
-    assert held(0.2 - 1e-12)[3, 0] == -5.0
+    assert held(0.2 - 1e-12)[3, 0] == 0.0
     assert held(0.39)[0, 1] == 30.0
     assert held(7.0)[0, 1] == 0.0
     straight = read_disturbance(path, model, linear=True)
@@ -123,6 +128,67 @@ def test_disturbance(fmu: Path, tmp_path: Path, model: Model) -> None:
         without = simulator.run(stop_time=0.8)
     np.testing.assert_array_equal(from_file.x, expected.x)
     assert np.abs(from_file.x - without.x).max() > 1e-2
+
+
+def pulse(path: Path) -> Path:
+    """Two rows between the samples at 1 and 1.02 s."""
+    path.write_text('time,"d_ext[1,1]"\n1.005,1000\n1.015,0\n')
+    return path
+
+
+def test_every_row_acts_between_two_samples(fmu: Path, tmp_path: Path, model: Model) -> None:
+    inputs = read_disturbance(pulse(tmp_path / "pulse.csv"), model)
+    push = np.zeros((5, 2))
+    push[0, 0] = 1000.0
+    game = read_game(default_game())
+    expected = simulate(
+        game, [1.02], rtol=1e-9, breakpoints=[(1.005, {"d_ext": push}), (1.015, {"d_ext": 0.0})]
+    )
+    with Simulator(fmu) as simulator:
+        result = simulator.run(stop_time=1.1, inputs=inputs)
+        late = simulator.run(start_time=1.01, stop_time=1.02, inputs=inputs)
+        without = simulator.run(start_time=1.01, stop_time=1.02)
+    assert len(result.time) == 56
+    assert result["x[1,1]"][51] == pytest.approx(expected.x[0, 0, 0], abs=1e-4)
+    assert result["x[1,1]"][51] == pytest.approx(8.03, abs=0.01)
+    assert late.x[-1, 0, 0] - without.x[-1, 0, 0] > 3.0  # the row before the start is in force there
+
+
+def test_straight_between_rows(fmu: Path, tmp_path: Path, model: Model) -> None:
+    """The FMU gets the slope, not a staircase: the oracle's rates under a ramp from 1.005 to 1.015 s."""
+    ramp = read_disturbance(pulse(tmp_path / "ramp.csv"), model, linear=True)
+    game = replace(read_game(default_game()), robust=False)
+    inside = np.zeros((5, 2), dtype=np.bool_)
+    state, begin = initial_state(game), 0.0
+    for end in (1.005, 1.015, 1.02):
+        state = solve_ivp(
+            lambda t, y: np.asarray(state_rate(game, t, y, inside, np.asarray(ramp(t)))),
+            (begin, np.nextafter(end, 0.0)),
+            state,
+            rtol=1e-9,
+            atol=1e-10,
+        ).y[:, -1]
+        begin = end
+    with Simulator(fmu) as simulator:
+        result = simulator.run(
+            start_values={"robust": False}, stop_time=1.02, inputs=ramp, tolerance=1e-9, outputs=["x"]
+        )
+    np.testing.assert_allclose(result.x[-1], unpack(game, state).x, rtol=0.0, atol=1e-5)
+
+
+def test_rows_at_a_large_time(model: Model) -> None:
+    begin = 1.76e9
+    values = np.ones((1, model.players, model.dimension))
+    assert Disturbance(np.array([begin + 1.0]), values)(begin + 0.5).max() == 0.0
+
+
+@pytest.mark.parametrize(
+    ("time", "value", "told"),
+    [([1.0, 1.0], 0.0, "do not go up"), ([0.0, 1.0], np.nan, "finite"), ([0.0], 0.0, "are not")],
+)
+def test_rows_that_cannot_be(time: list[float], value: float, told: str) -> None:
+    with pytest.raises(ScheduleError, match=told):
+        Disturbance(np.array(time), np.full((2, 5, 2), value))
 
 
 def test_disturbance_round_trip(tmp_path: Path, model: Model) -> None:
