@@ -163,7 +163,7 @@ def run(
         typer.Option(
             metavar="NAMES",
             help="Variables to record, separated by commas; x stands for every x\\[i,l]; repeatable. "
-            "All but y and W when left out.",
+            "All outputs and locals but y, W and time derivatives when left out.",
         ),
     ] = None,
     graph_schedule: Annotated[

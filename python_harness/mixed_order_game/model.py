@@ -128,16 +128,30 @@ class Model:
         return self.variables[name]
 
     def select(self, names: Iterable[str]) -> list[Variable]:
-        """Variables by name; x stands for every x[i,l]. No duplicates. Raises VariableError."""
+        """Variables by name; x stands for every x[i,l], der(x) for every der(x[i,l]), each once.
+
+        Raises VariableError.
+        """
         chosen: dict[str, Variable] = {}
         for name in names:
+            rates = self._rates(name)
             if name in self.variables:
                 chosen[name] = self.variables[name]
             elif name in self._groups:
                 chosen |= {variable.name: variable for variable in self._groups[name].values()}
+            elif rates:
+                chosen |= {rate: self.variables[rate] for rate in rates}
             else:
                 raise self._unknown(name, [*self._groups, *self.variables])
         return list(chosen.values())
+
+    def _rates(self, name: str) -> list[str]:
+        """Names of all time derivatives of one kind, der(x[1,1]), ... for der(x); none for another name."""
+        if not (name.startswith("der(") and name.endswith(")")):
+            return []
+        stem = name.removeprefix("der(").removesuffix(")")
+        named = (f"der({variable.name})" for variable in self.indexed(stem).values())
+        return [rate for rate in named if rate in self.variables]
 
     @staticmethod
     def _unknown(name: str, known: Iterable[str]) -> VariableError:

@@ -37,7 +37,7 @@ Progress = Callable[[float], None]
 
 LARGEST_SAMPLES = 10_000_000
 LEFT_OUT = ("y", "W")
-"""Estimates and weights: N^2 D and N q D columns, recorded only when asked for."""
+"""Estimates and weights: N^2 D and N q D columns, recorded only when asked for, like all time derivatives."""
 
 
 def run(
@@ -132,8 +132,8 @@ class Simulator:
         start_values: parameters and inputs to set first, others keep the FMU's start values.
         step: communication step in s; the last one is shorter if the horizon is not a multiple of it.
         tolerance: relative tolerance of the integrator.
-        outputs: names to record; x stands for every x[i,l]. Default: all outputs and locals but y and W.
-            x_star is always recorded.
+        outputs: names to record; x stands for every x[i,l], der(x) for every der(x[i,l]). Default: all
+            outputs and locals but y, W and the time derivatives. x_star is always recorded.
         inputs: external disturbance d_ext: a function of the time in s giving (N, D), or an array (N, D), or
             (T, N, D) with one row a sample, each held over each communication step at the value of its
             beginning; or a schedule.Disturbance, whose rows act exactly at their times, held or straight
@@ -218,6 +218,7 @@ class Simulator:
         if outputs is not None:
             return self.model.select([*outputs, "x_star"])
         left_out = {variable.name for stem in LEFT_OUT for variable in self.model.indexed(stem).values()}
+        left_out |= {name for name in self.model.variables if name.startswith("der(")}
         return [
             variable
             for variable in self.model.variables.values()

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from mixed_order_game import SimulationError, Simulator, VariableError, run
+from mixed_order_game.names import parse_name
 from tests.conftest import FmuOf
 
 
@@ -24,7 +25,12 @@ def test_defaults(fmu: Path) -> None:
     assert result.largest_error(16.0) < 0.00125
     for signal in (result.v, result.z, result.u, result.phi, result.nn, result.W_norm2):
         assert signal.shape == (1001, 5, 2)
-    assert not any(name.startswith(("y[", "W[")) for name in result.columns)
+    stems = {parse_name(name)[0] for name in result.columns}
+    assert stems == {
+        *("x", "v", "u", "nash_error", "x_star", "z", "W_norm2", "phi", "nn", "cost", "consensus_error"),
+        *("gradient_norm", "solver_steps", "solver_rhs_evaluations", "solver_events"),
+    }
+    assert len(result.columns) == 81
     assert result.parameters["k1"] == 10.0
     assert result["solver_steps"][-1] > 100
     np.testing.assert_allclose(
@@ -40,6 +46,19 @@ def test_chosen_outputs(simulator: Simulator) -> None:
     assert "x[1,1]" not in result.columns
     assert result.x_star.shape == (5, 2)
     assert np.all(result["cost[1]"] > 0.0)
+
+
+def test_derivatives_when_named(simulator: Simulator) -> None:
+    result = simulator.run(
+        stop_time=0.02, step=1e-5, outputs=["x", "v", "der(x)", "der(v[4,1])"], tolerance=1e-10
+    )
+    rates = [name for name in result.columns if name.startswith("der(")]
+    assert rates == [*(f"der(x[{i},{k}])" for i in range(1, 6) for k in (1, 2)), "der(v[4,1])"]
+    for name in rates:
+        difference = np.gradient(result[name[4:-1]], result.time)
+        np.testing.assert_allclose(result[name][1:-1], difference[1:-1], rtol=1e-3, atol=1e-2, err_msg=name)
+    with pytest.raises(VariableError, match=r"there is no variable der\(q\)"):
+        simulator.run(outputs=["der(q)"])
 
 
 def test_start_values(simulator: Simulator) -> None:
