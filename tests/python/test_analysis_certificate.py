@@ -20,6 +20,7 @@ from mixed_order_game.analysis import (
     theorem_2_rate,
     theorem_2_thresholds,
 )
+from mixed_order_game.analysis.analyst import paper_thresholds
 from mixed_order_game.analysis.certificate import Weights, proved_rate
 from mixed_order_game.analysis.constants import NO_DYNAMICS
 from mixed_order_game.analysis.design import paper_constants
@@ -38,6 +39,7 @@ NAMES = [
     "four_first_order",
     "two_scalar_players",
 ]
+K = ("k1", "k2", "k3", "k4")
 FORMULAS = {
     "boundedness": paper_bounds.boundedness_coefficients,
     "theorem 1": paper_bounds.theorem_1_coefficients,
@@ -179,6 +181,37 @@ def test_paper_thresholds_are_roots_and_ordered(name: str, formula: str) -> None
             assert at == pytest.approx(0.0, abs=1e-9 * (1.0 + threshold))
             assert above > at
             assert not limits.met(replace(gains, **{gain: 0.999 * threshold}))
+
+
+@pytest.mark.parametrize("formula", ["theorem 1", "theorem 2"])
+def test_gains_above_every_threshold_shown_are_met_and_no_others(name: str, formula: str) -> None:
+    """And the gains for which the thresholds are shown, raised just above them, are met too."""
+    game = read_game(files(name))
+    c = loop_constants(game.parameters)
+    g = dynamics_constants(game.parameters, 5.0, 5.0)
+    if formula == "theorem 2":
+        g = replace(NO_DYNAMICS, lipschitz=np.zeros(game.parameters.players))
+    random = np.random.default_rng(12)
+    for _ in range(6):
+        gains = with_k(game.gains, *(10.0 ** random.uniform(-1.0, 8.0, size=4)).tolist())
+        shown = paper_thresholds(game.with_gains(gains), c, FORMULAS[formula], g)
+        assert shown.met == shown.limits.met(gains)
+        raised = {gain: max(getattr(shown.counted, gain), 1.001 * getattr(shown.limits, gain)) for gain in K}
+        assert paper_thresholds(game.with_gains(replace(gains, **raised)), c, FORMULAS[formula], g).met
+
+
+def test_gains_above_the_sharper_thresholds_shown_have_a_rate(name: str) -> None:
+    """k4* is that for the given k3 where this exceeds k3*, and no gains just below k3* have a rate."""
+    game = read_game(files(name))
+    c = loop_constants(game.parameters)
+    random = np.random.default_rng(13)
+    for _ in range(3):
+        k1, k2, part = 10.0 ** random.uniform([-2.0, -1.0, 0.005], [2.0, 1.0, 2.0])
+        k3 = theorem_2_thresholds(c, k2, margin=3.0).k3
+        gains = with_k(game.gains, k1, k2, k3 * part, 1.0)
+        k4 = theorem_2_thresholds(c, k2, margin=3.0, given=gains).k4
+        assert theorem_2_rate(c, replace(gains, k4=1.02 * k4 + 1e-3)) > 0.0
+        assert theorem_2_rate(c, replace(gains, k3=0.99 * k3, k4=1e9)) <= 1e-6
 
 
 def test_gains_for_a_rate_have_it(name: str) -> None:

@@ -1,5 +1,6 @@
 """Designs for Theorem 1, the network's fit and the whole analysis, with runs of the FMU."""
 
+import io
 import json
 import math
 import re
@@ -235,11 +236,19 @@ def test_analysis_of_the_example(fmu: Path) -> None:
     assert found.value("network", "delta needed along the run") == pytest.approx(31.1, abs=0.5)
     assert any("Along the run itself delta = 10 is too small" in verdict for verdict in found.verdicts)
     assert any("Yet the run" in verdict for verdict in found.verdicts)
-    assert any("The loop itself needs k3 > 2.04" in verdict for verdict in found.verdicts)
+    assert "for k3 from 2.04 to 5e+04 1/s" in found.verdicts[0]
+    # k2 = 1 exceeds k2* = 0.76, so the thresholds after it are for k2 = 1; k1* = l^2 k2^2 N / 2 + l k2 / 2.
+    lipschitz = found.constants.largest_lipschitz
+    assert found.value("theorem 2", "k1*") == pytest.approx(2.5 * lipschitz**2 + 0.5 * lipschitz)
+    assert "k1 = 10, k1* = 386.2 1/s for k2 = 1)" in found.verdicts[1]
     told = json.dumps(found.to_dict(), allow_nan=False)
     assert json.loads(told)["constants"]["monotonicity"] == pytest.approx(3.2935006)
-    console = Console(record=True, width=200, file=None, quiet=True)
-    print_analysis(found, console)
+    for tables in (False, True):
+        console = Console(record=True, width=2000, file=io.StringIO())
+        print_analysis(found, console, tables=tables)
+        lines = console.export_text().splitlines()
+        assert lines[: len(found.verdicts) + 1] == [found.title, *(f"- {each}" for each in found.verdicts)]
+        assert (len(lines) > 100) is tables
 
 
 def test_analysis_without_the_square(five: AnalysedGame) -> None:
@@ -269,17 +278,36 @@ def test_analysis_meets_the_thresholds_of_its_own_design(fmu: Path) -> None:
     assert printed < float(found.value("theorem 1", "radius with D coordinates"))
 
 
-def test_analysis_of_a_disconnected_graph(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("changes", "stable", "told"),
+    [
+        (
+            {"[[1, 2], [2, 3], [3, 4], [4, 5], [5, 1]]": "[[1, 2], [2, 3]]"},
+            False,
+            "Theorems 1 and 2 do not apply: Assumption 2: undirected connected graph, fails"
+            " (lambda_min(L (x) I + A_0) = 0; no path from player 1 to 4, 5).",
+        ),
+        # Every own cost is convex, but the symmetric part of h is indefinite.
+        (
+            {"constant = 1.0, coupling = [[2, 1.0]]": "constant = 1.0, coupling = [[2, 40.0]]"},
+            True,
+            "Theorems 1 and 2 do not apply: Assumption 3: strongly monotone, fails (m = -11.39).",
+        ),
+    ],
+)
+def test_analysis_names_the_assumption_that_fails(
+    changes: dict[str, str], stable: bool, told: str, tmp_path: Path
+) -> None:
     text = FIVE_VEHICLES.read_text(encoding="utf-8")
-    ring = "[[1, 2], [2, 3], [3, 4], [4, 5], [5, 1]]"
-    assert ring in text
-    broken = tmp_path / "broken.toml"
-    broken.write_text(text.replace(ring, "[[1, 2], [2, 3]]"), encoding="utf-8")
-    found = analyse(broken, simulation=False)
-    assert {each.name: each.holds for each in found.hypotheses}[
-        "Assumption 2: undirected connected graph"
-    ] is False
+    for old, new in changes.items():
+        assert old in text
+        text = text.replace(old, new)
+    game = tmp_path / "game.toml"
+    game.write_text(text, encoding="utf-8")
+    found = analyse(game, simulation=False)
+    assert told in found.verdicts
     assert not found.demonstrations
+    assert found.value("exact", "stable") is stable
 
 
 def test_analysis_refuses(fmu: Path, tmp_path: Path) -> None:
@@ -330,8 +358,12 @@ def test_command(app: typer.Typer) -> None:
     assert result.exit_code == 0, result.output
     told = json.loads(result.output)
     assert told["title"] == "Connectivity control of five vehicles"
-    table = CliRunner().invoke(app, ["analyse", str(FIVE_VEHICLES), "--no-simulation"])
-    assert "theorem 1" in table.output
+    short, table = (
+        CliRunner().invoke(app, ["analyse", str(FIVE_VEHICLES), "--no-simulation", *options])
+        for options in ([], ["--tables"])
+    )
+    assert table.output.startswith(short.output)
+    assert "theorem 1" in table.output.removeprefix(short.output)
     assert CliRunner().invoke(app, ["analyse", "--set", "k1"]).exit_code == 2
     help_text = CliRunner().invoke(app, ["analyse", "--help"])
     assert help_text.exit_code == 0

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -21,20 +21,21 @@ from .certificate import (
     theorem_2_rate,
     theorem_2_thresholds,
 )
-from .constants import NO_DYNAMICS, LoopConstants, dynamics_constants, loop_constants
+from .constants import NO_DYNAMICS, DynamicsConstants, LoopConstants, dynamics_constants, loop_constants
 from .design import K3_MARGIN, Design, paper_constants, paper_design, sharper_design
 from .domain import Domain, domain, initial_errors
 from .exact_loop import (
     LARGEST_LINEAR_LOOP,
     LARGEST_SEARCH,
     SETTLED,
+    SPAN,
     ExactLoop,
     exact_ceiling,
     exact_loop,
     exact_threshold,
 )
 from .findings import Analysis, Demonstration, Figure, Row
-from .game import AnalysedGame
+from .game import AnalysedGame, Gains
 from .hypotheses import (
     Hypothesis,
     design_hypotheses,
@@ -42,11 +43,12 @@ from .hypotheses import (
     largest_representable_radius,
     robust_term,
     standing_assumptions,
+    told_for,
     weight_bound,
 )
 from .lyapunov import scaled_identity
 from .network_fit import NetworkFit, least_squares_fit, mirror_bound, trajectory_fit
-from .paper_bounds import Formula, PaperConstants, Thresholds
+from .paper_bounds import ORDER, Formula, PaperConstants, Thresholds
 from .simulation import Seen, simulate
 
 FloatArray = NDArray[np.float64]
@@ -59,6 +61,9 @@ SETTLED_PART = 0.8
 
 SHARPER, PAPER = "the sharper certificate", "the paper's constants"
 """Names of the two designs."""
+
+COUNTED_MARGIN = 1.1
+"""Factor over its threshold at which a gain that does not exceed it counts in the thresholds after it."""
 
 LISTED = 10
 """Most players whose constants get a row each; larger games get ranges."""
@@ -84,6 +89,7 @@ class Analyst:
         except np.linalg.LinAlgError as error:
             raise GameError(f"{game.path} has no unique Nash equilibrium") from error
         self.constants = loop_constants(game.parameters)
+        self.assumptions = standing_assumptions(game, self.constants)
         self.rows: list[Row] = []
         self.verdicts: list[str] = []
         self.stop_time = read_model(fmu).stop_time if fmu is not None else DEFAULT_STOP
@@ -94,9 +100,9 @@ class Analyst:
         self._constants()
         exact = self._exact()
         self._theorem_2(exact)
-        limits = self._theorem_1()
+        paper = self._theorem_1()
         runs = self._runs(exact)
-        hypotheses = self._own_gains(limits, runs.get("robust"))
+        hypotheses = self._own_gains(paper, runs.get("robust"))
         demonstrations = self._demonstrations()
         self._report("demonstration", 1.0)
         return Analysis(
@@ -110,6 +116,11 @@ class Analyst:
             exact=exact,
             runs=runs,
         )
+
+    @property
+    def _applicable(self) -> bool:
+        """Whether graph and costs are those of the theorems: connected, strongly monotone."""
+        return self.constants.slowest_consensus > 0.0 and self.constants.monotonicity > 0.0
 
     def _report(self, name: str, part: float) -> None:
         if self.progress is not None:
@@ -161,33 +172,47 @@ class Analyst:
         self._row(
             "exact", "settling time", exact.settling_time, "s", f"predicted, |x - x*| to {part} of its start"
         )
+        reach = ""
         if p.players <= LARGEST_SEARCH:
-            for name in ("k3", "k4"):
-                meaning = f"stable for every larger {name}, others as given"
-                self._row("exact", f"least {name}", exact_threshold(p, name), "1/s", meaning)
-            meaning = "stable for every smaller k2, others as given"
-            self._row("exact", "greatest k2", exact_ceiling(p, "k2"), "1/s", meaning)
+            limits = {name: exact_threshold(p, name, span=SPAN) for name in ("k3", "k4")}
+            for name, value in limits.items():
+                own = getattr(p, name)
+                meaning = (
+                    f"stable from it to {own * SPAN:.3g}, tried from {own / SPAN:.3g} on; others as given"
+                )
+                self._row("exact", f"least {name}", value, "1/s", meaning)
+            meaning = f"stable from {p.k2 / SPAN:.3g} to it, tried up to {p.k2 * SPAN:.3g}; others as given"
+            self._row("exact", "greatest k2", exact_ceiling(p, "k2", span=SPAN), "1/s", meaning)
+            if math.isfinite(limits["k3"]):
+                least = max(limits["k3"], p.k3 / SPAN)
+                reach = (
+                    f" With the other gains given they do for k3 from {least:.3g} to {p.k3 * SPAN:.3g} 1/s."
+                )
         self.verdicts.append(
-            f"Without perturbation these gains converge exponentially: slowest rate {-exact.abscissa:.4g}/s,"
-            f" {part} of the start's error after {exact.settling_time:.3g} s."
-            if exact.stable
-            else "Without perturbation these gains do not converge: an eigenvalue has real part"
-            f" {exact.abscissa:.4g} 1/s."
+            (
+                "Without perturbation these gains converge exponentially:"
+                f" slowest rate {-exact.abscissa:.4g} 1/s,"
+                f" {part} of the start's error after {exact.settling_time:.3g} s."
+                if exact.stable
+                else "Without perturbation these gains do not converge: an eigenvalue has real part"
+                f" {exact.abscissa:.4g} 1/s."
+            )
+            + reach
         )
         return exact
 
     def _theorem_2(self, exact: ExactLoop | None) -> None:
-        c, gains = self.constants, self.game.gains
-        name = "theorem 2"
-        if c.slowest_consensus <= 0.0 or c.monotonicity <= 0.0:
-            self.verdicts.append(
-                "Theorems 1 and 2 do not apply: the graph is not connected or the game not monotone."
-            )
+        c, gains, name = self.constants, self.game.gains, "theorem 2"
+        if not self._applicable:
+            missing = [each for each in self.assumptions[1:3] if not each.holds]
+            told = "; ".join(f"{each.name}, fails ({each.figures})" for each in missing)
+            self.verdicts.append(f"Theorems 1 and 2 do not apply: {told}.")
             return
-        p, limits, met = _paper_thresholds(self.game, c, paper_bounds.theorem_2_coefficients, dynamics=False)
-        self._paper_rows(name, p, limits)
-        self._row(name, "met", met, "1", "the paper's thresholds hold for the given gains")
-        sharper = theorem_2_thresholds(c, gains.k2, margin=K3_MARGIN)
+        none = replace(NO_DYNAMICS, lipschitz=np.zeros(c.players))
+        paper = paper_thresholds(self.game, c, paper_bounds.theorem_2_coefficients, none)
+        self._paper_rows(name, paper)
+        self._row(name, "met", paper.met, "1", "the paper's thresholds hold for the given gains")
+        sharper = theorem_2_thresholds(c, gains.k2, margin=K3_MARGIN, given=gains)
         self._sharper_rows(name, sharper)
         rate = theorem_2_rate(c, gains)
         self._row(
@@ -197,26 +222,38 @@ class Analyst:
             "1/s",
             "proved rate of |x - x*| for the given gains; <= 0 proves nothing",
         )
-        conservative = f"k3* = {limits.k3:.3g} and k4* = {limits.k4:.3g} 1/s"
-        told = f"Theorem 2's thresholds {'are' if met else 'are not'} met by the given gains ({conservative})"
-        if exact is not None and exact.stable and not met:
-            told += ", although the loop is stable: the theorem is sufficient, not necessary"
-        own = f"k3* = {sharper.k3:.3g} and, at {K3_MARGIN:g} k3*, k4* = {sharper.k4:.3g} 1/s"
-        limit = next(
-            (row.value for row in self.rows if (row.section, row.name) == ("exact", "least k3")), None
-        )
-        true = (
-            ""
-            if limit is None
-            else f" The loop itself needs k3 > {limit:.3g} 1/s with the other gains given."
-        )
+        missed = [each for each in gain_thresholds(self.game, paper.limits, paper.counted) if not each.holds]
+        if paper.met:
+            self.verdicts.append("Theorem 2 holds for the given gains: every gain exceeds its threshold.")
+        else:
+            told = "; ".join(f"{each.name} ({each.figures})" for each in missed)
+            although = exact is not None and exact.stable
+            sufficient = " The loop is stable all the same: the theorem is sufficient, not necessary."
+            self.verdicts.append(
+                f"Theorem 2 guarantees nothing for the given gains. What fails: {told}."
+                + (sufficient if although else "")
+            )
+        needs = f"k3 > {sharper.k3:.3g}"
+        if c.second_players:
+            needs += f" and, for k3 = {self._counted_k3(sharper):.3g}, k4 > {sharper.k4:.3g}"
         self.verdicts.append(
-            f"{told}. The sharper certificate needs {own} for this k2, any k1 > 0, and any k2 > 0.{true}"
+            (
+                f"The sharper certificate proves the rate {rate:.3g} 1/s of |x - x*| without perturbation."
+                if rate > 0.0
+                else "The sharper certificate proves no rate either."
+                if not paper.met
+                else "The sharper certificate proves no rate."
+            )
+            + f" At k2 = {gains.k2:g} it asks {needs} 1/s, and any k1 > 0."
         )
 
-    def _theorem_1(self) -> Thresholds | None:
+    def _counted_k3(self, sharper: SufficientGains) -> float:
+        """The k3 that the sharper k1* and k4* are for."""
+        return self.game.gains.k3 if self.game.gains.k3 > sharper.k3 else K3_MARGIN * sharper.k3
+
+    def _theorem_1(self) -> "PaperThresholds | None":
         c, gains, name = self.constants, self.game.gains, "theorem 1"
-        if c.slowest_consensus <= 0.0 or c.monotonicity <= 0.0:
+        if not self._applicable:
             return None
         weights = sufficient_gains(c, NO_DYNAMICS, gains.k2, rate=gains.k2 * c.monotonicity).weights
         level = float(initial_errors(self.game.parameters).level(weights)[0])
@@ -227,15 +264,17 @@ class Analyst:
             self.game.parameters, set_of_start.action_radius, set_of_start.estimate_radius
         )
         self._row(name, "eta on set", local.largest, "1/s", "largest Lipschitz constant of g on that set")
-        p, limits, met = _paper_thresholds(
-            self.game, c, paper_bounds.theorem_1_coefficients, dynamics=True, radii=set_of_start
-        )
-        self._paper_rows(name, p, limits)
+        paper = paper_thresholds(self.game, c, paper_bounds.theorem_1_coefficients, local)
+        self._paper_rows(name, paper)
         self._row(
-            name, "met", met, "1", "the paper's thresholds hold for the given gains, with eta on that set"
+            name,
+            "met",
+            paper.met,
+            "1",
+            "the paper's thresholds hold for the given gains, with eta on that set",
         )
         for label, coordinates in (("printed", 1), ("with D coordinates", c.dimension)):
-            constants = paper_constants(self.game, c, p=p, dynamics=local, coordinates=coordinates)
+            constants = paper_constants(self.game, c, p=paper.p, dynamics=local, coordinates=coordinates)
             coefficients = paper_bounds.theorem_1_coefficients(constants, gains)
             for kind, level_of in (
                 ("", paper_bounds.ultimate_level),
@@ -244,9 +283,11 @@ class Analyst:
                 value = paper_bounds.action_radius(
                     level_of(constants, gains, coefficients), first_players=c.first_players
                 )
-                self._row(name, f"radius {label}{kind}", value, "L", "guaranteed lim sup |x - x*|; inf: none")
-        self._printed_demand(paper_constants(self.game, c, p=p, dynamics=local))
-        self._sharper_rows(name, sufficient_gains(c, local, gains.k2, margin=K3_MARGIN))
+                self._row(
+                    name, f"radius {label}{kind}", value, "L", "lim sup |x - x*| if delta suffices; inf: none"
+                )
+        self._printed_demand(paper_constants(self.game, c, p=paper.p, dynamics=local))
+        self._sharper_rows(name, sufficient_gains(c, local, gains.k2, margin=K3_MARGIN, given=gains))
         certificate = best_certificate(c, local, gains)
         self._row(name, "sharper rate", certificate.rate, "1/s", "proved rate of V; <= 0 proves nothing")
         own = (
@@ -254,8 +295,14 @@ class Analyst:
             if certificate.rate > 0.0
             else math.inf
         )
-        self._row(name, "sharper radius", own, "L", "guaranteed lim sup |x - x*| by the sharper certificate")
-        return limits
+        self._row(
+            name,
+            "sharper radius",
+            own,
+            "L",
+            "lim sup |x - x*| by the sharper certificate, if delta suffices and the run stays in that set",
+        )
+        return paper
 
     def _printed_demand(self, constants: PaperConstants) -> None:
         """What the printed level of V, with its factor 1, asks for the wished radius: K and with it k4."""
@@ -318,11 +365,17 @@ class Analyst:
         self._row("simulation", "max |x - x*|", float(seen.error.max()), "L", "over the run")
         self._row("simulation", "max w'w", seen.largest_weight_norm2, "1", "largest weight column")
 
-    def _own_gains(self, limits: Thresholds | None, seen: Seen | None) -> list[Hypothesis]:
+    def _own_gains(self, paper: "PaperThresholds | None", seen: Seen | None) -> list[Hypothesis]:
         """The hypotheses of Theorem 1 for the given gains, on the smallest set known to hold the run."""
         game, c = self.game, self.constants
-        found = standing_assumptions(game, c)
-        if limits is None:
+        found = list(self.assumptions)
+        begin = SETTLED_PART * self.stop_time
+        stays = (
+            f"stays within {seen.radius(begin):.3g} of the equilibrium from {begin:g} s on." if seen else ""
+        )
+        if paper is None:
+            if seen is not None:
+                self.verdicts.append(f"The run with the given gains {stays}")
             return found
         weights = sufficient_gains(c, NO_DYNAMICS, game.gains.k2, rate=game.gains.k2 * c.monotonicity).weights
         level = float(initial_errors(game.parameters).level(weights)[0])
@@ -354,19 +407,26 @@ class Analyst:
                     f"Along the run itself delta = {game.gains.delta:g} is too small for every W*:"
                     f" {least:.3g} is needed."
                 )
-        found += [robust_term(game, on_set), weight_bound(game, fit), *gain_thresholds(game, limits)]
+        found += [
+            robust_term(game, on_set),
+            weight_bound(game, fit),
+            *gain_thresholds(game, paper.limits, paper.counted),
+        ]
         failing = [each for each in found if each.holds is False]
         if failing:
             told = "; ".join(f"{each.name} ({each.figures})" for each in failing)
             self.verdicts.append(f"Theorem 1 guarantees nothing for the given gains. What fails: {told}.")
             if seen is not None:
-                begin = SETTLED_PART * self.stop_time
-                self.verdicts.append(
-                    f"Yet the run with the given gains stays within {seen.radius(begin):.3g} of the"
-                    f" equilibrium from {begin:g} s on."
-                )
+                self.verdicts.append(f"Yet the run with the given gains {stays}")
+        elif undecided := [f"{each.name} ({each.figures})" for each in found if each.holds is None]:
+            self.verdicts.append(
+                f"No hypothesis of Theorem 1 fails for the given gains; open: {'; '.join(undecided)}."
+            )
         else:
-            self.verdicts.append("No hypothesis of Theorem 1 fails for the given gains.")
+            self.verdicts.append(
+                "Every hypothesis of Theorem 1 holds for the given gains where"
+                f" |y_i - x*| <= {on_set.estimate_radius:.3g}."
+            )
         return found
 
     def _fit_rows(self, where: str, fit: NetworkFit, mirror: float | None) -> None:
@@ -387,8 +447,8 @@ class Analyst:
         )
 
     def _demonstrations(self) -> list[Demonstration]:
-        c, game = self.constants, self.game
-        if c.slowest_consensus <= 0.0 or c.monotonicity <= 0.0:
+        game = self.game
+        if not self._applicable:
             return []
         demonstrations = []
         for name in (SHARPER, PAPER):
@@ -479,47 +539,64 @@ class Analyst:
         self._row(section, f"|x - x*| on {of}", found.action_radius, "L", "largest on the sublevel set")
         self._row(section, f"|y_i - x*| on {of}", found.estimate_radius, "L", "largest on the sublevel set")
 
-    def _paper_rows(self, section: str, p: float, limits: Thresholds) -> None:
+    def _paper_rows(self, section: str, paper: "PaperThresholds") -> None:
         c = self.constants
-        self._row(section, "p", p, "1", "P = p I, Q = 2 p (L (x) I + A_0)")
-        self._row(section, "lambda_min(Q)", 2.0 * p * c.slowest_consensus, "1", "of that choice")
-        for name in ("k2", "k1", "k3", "k4"):
-            self._row(section, f"{name}*", getattr(limits, name), "1/s", "the paper's threshold")
+        self._row(section, "p", paper.p, "1", "P = p I, Q = 2 p (L (x) I + A_0)")
+        self._row(section, "lambda_min(Q)", 2.0 * paper.p * c.slowest_consensus, "1", "of that choice")
+        for name in ORDER:
+            meaning = f"the paper's threshold{told_for(name, paper.counted)}"
+            self._row(section, f"{name}*", getattr(paper.limits, name), "1/s", meaning)
 
     def _sharper_rows(self, section: str, sharper: SufficientGains) -> None:
-        self._row(section, "sharper k3*", sharper.k3, "1/s", "comparison matrix, for the given k2")
-        self._row(
-            section, "sharper k1*", sharper.k1, "1/s", f"the same, k3 at {K3_MARGIN:g} times its threshold"
-        )
-        self._row(section, "sharper k4*", sharper.k4, "1/s", "the same")
+        k2, k3 = self.game.gains.k2, self._counted_k3(sharper)
+        self._row(section, "sharper k3*", sharper.k3, "1/s", f"comparison matrix, for k2 = {k2:.4g}")
+        meaning = f"the same, for k3 = {k3:.4g}"
+        self._row(section, "sharper k1*", sharper.k1, "1/s", meaning)
+        self._row(section, "sharper k4*", sharper.k4, "1/s", meaning)
 
 
-def _paper_thresholds(
-    game: AnalysedGame, c: LoopConstants, formula: Formula, *, dynamics: bool, radii: Domain | None = None
-) -> tuple[float, Thresholds, bool]:
-    """p, the paper's thresholds for it and whether some p has them all met.
+@dataclass(frozen=True)
+class PaperThresholds:
+    """The paper's thresholds for P = p I, the gains they are for, and whether the given ones meet them."""
 
-    k2* is that of the formula; k1*, k3* and k4* are those of gains 10 % above the thresholds before, in the
-    paper's order, with the p that makes k4* smallest, unless the given gains meet all thresholds for some
-    p.
+    p: float
+    limits: Thresholds
+    counted: Gains
+    met: bool
+
+
+def paper_thresholds(
+    game: AnalysedGame, c: LoopConstants, formula: Formula, dynamics: DynamicsConstants
+) -> PaperThresholds:
+    """Thresholds for the given gains, see `thresholds_for`, and a p that has them all met if there is one.
+
+    The coefficients are concave in p, so the p that makes the smallest one largest tells whether the given
+    gains meet them. Otherwise p is the one for which they lack least: the product of the factors by which
+    gains must rise is smallest.
     """
     gains = game.gains
-    local = NO_DYNAMICS
-    if dynamics and radii is not None:
-        local = dynamics_constants(game.parameters, radii.action_radius, radii.estimate_radius)
+    start = paper_constants(game, c, p=1.0, dynamics=dynamics)
 
-    def constants(p: float) -> PaperConstants:
-        none = replace(NO_DYNAMICS, lipschitz=np.zeros(game.parameters.players))
-        return paper_constants(game, c, p=p, dynamics=local if dynamics else none)
+    def constants(log_p: float) -> PaperConstants:
+        return replace(start, pair=scaled_identity(c.slowest_consensus, math.exp(log_p)))
 
-    grid = np.geomspace(1e-6, 1e2, 81).tolist()
-    best = max(grid, key=lambda p: formula(constants(p), gains).smallest)
-    if formula(constants(best), gains).smallest > 0.0:
-        return best, paper_bounds.thresholds(formula, constants(best), gains), True
+    def lacking(log_p: float) -> float:
+        limits, _ = paper_bounds.thresholds_for(formula, constants(log_p), gains, COUNTED_MARGIN)
+        ratios = [getattr(limits, name) / getattr(gains, name) for name in ORDER]
+        return sum(math.log(ratio) for ratio in ratios if ratio > 1.0)
 
-    def largest(log_p: float) -> float:
-        return math.log(paper_bounds.gains_above(formula, constants(math.exp(log_p)), gains, 1.1).k4)
+    log_p = _minimum(lambda each: -formula(constants(each), gains).smallest)
+    met = formula(constants(log_p), gains).smallest > 0.0
+    if not met:
+        log_p = _minimum(lacking)
+    limits, counted = paper_bounds.thresholds_for(formula, constants(log_p), gains, COUNTED_MARGIN)
+    return PaperThresholds(math.exp(log_p), limits, counted, met)
 
-    p = math.exp(float(minimize_scalar(largest, bounds=(-12.0, 2.0), method="bounded").x))
-    above = paper_bounds.gains_above(formula, constants(p), gains, 1.1)
-    return p, paper_bounds.thresholds(formula, constants(p), above), False
+
+def _minimum(function: Callable[[float], float]) -> float:
+    """Where a function of log(p) is smallest: on a grid, then between the neighbours of its best point."""
+    grid = np.linspace(-30.0, 10.0, 121)
+    best = float(grid[int(np.argmin([function(each) for each in grid.tolist()]))])
+    step = float(grid[1] - grid[0])
+    found = minimize_scalar(function, bounds=(best - step, best + step), method="bounded")
+    return float(found.x) if found.fun < function(best) else best

@@ -47,6 +47,10 @@ K1_MARGIN = 2.0
 """k1: k4* falls as k1 rises above its own."""
 
 
+LARGEST = 1e300
+"""Stands for infinity in searches, which subtract what they compare."""
+
+
 @dataclass(frozen=True)
 class Weights:
     """Weights of V beside w_a = 1. velocities in s^2, the others dimensionless."""
@@ -151,7 +155,7 @@ def best_certificate(
 
     def loss(logs: FloatArray) -> float:
         rate = proved_rate(c, g, gains, unpacked(logs), tracking=tracking)
-        return -rate if math.isfinite(rate) else 1e300
+        return -rate if math.isfinite(rate) else LARGEST
 
     logs = np.log([start.velocities, start.tracking, start.estimates])
     for _ in range(2):
@@ -179,6 +183,7 @@ def sufficient_gains(
     margin: float = MARGIN,
     tracking: bool = True,
     estimates_weight: float | None = None,
+    given: Gains | None = None,
 ) -> SufficientGains:
     """Thresholds by Schur complements, in the paper's order k2, k3, k1, k4.
 
@@ -190,7 +195,8 @@ def sufficient_gains(
 
     with A = k2 m - rate/2, c = ||2 p E h - B'||, c_f = (k2 ||h_f||, k2 l_f + eta_f), c_s the velocities' row.
     p minimizes k3*, w_s minimizes k4*; an estimates_weight given is the p of k1* and k4*. These two are for
-    k3 at `margin` times its threshold and, k4*, for k1 at K1_MARGIN times its own. rate must be below 2 k2 m.
+    k3 at `margin` times its threshold and, k4*, for k1 at K1_MARGIN times its own; for the k3 and k1 of
+    `given` instead where these exceed their thresholds. rate must be below 2 k2 m.
     Infinite thresholds where nothing can be proved (not strongly monotone, not connected).
     """
     A = k2 * c.monotonicity - 0.5 * rate
@@ -204,9 +210,10 @@ def sufficient_gains(
     found = minimize_scalar(k3_for, bounds=(-25.0, 10.0), method="bounded", options={"xatol": 1e-10})
     p = math.exp(float(found.x)) if estimates_weight is None else estimates_weight
     k3 = (k2 * c.estimate_pull + 0.5 * rate + k3_for(float(found.x))) / c.slowest_consensus
+    own_k3 = given.k3 if given is not None and given.k3 > k3 else margin * k3
 
     def shifted(k1: float, k4: float, w_s: float) -> FloatArray:
-        gains = Gains(k1, k2, margin * k3, k4, 1.0, 1.0, 1.0, 1.0)
+        gains = Gains(k1, k2, own_k3, k4, 1.0, 1.0, 1.0, 1.0)
         theta, scale = comparison_matrix(c, g, gains, Weights(w_s, 1.0, p), tracking=tracking)
         return theta - rate * np.diag(scale)
 
@@ -219,13 +226,16 @@ def sufficient_gains(
     if VELOCITIES in groups:
         others = [index for index in range(len(groups) + 2) if index != 1]
         own_k1 = K1_MARGIN * k1 if k1 > 0.0 else 1e-3 * k2
+        if given is not None and given.k1 > k1:
+            own_k1 = given.k1
 
         def k4_for(log_w: float) -> float:
             w = math.exp(log_w)
-            return _schur(shifted(own_k1, 0.0, w), 1, others) / w
+            return min(_schur(shifted(own_k1, 0.0, w), 1, others) / w, LARGEST)
 
         best = minimize_scalar(k4_for, bounds=(-60.0, 20.0), method="bounded", options={"xatol": 1e-10})
         w_s, k4 = math.exp(float(best.x)), max(0.0, k4_for(float(best.x)))
+        k4 = k4 if k4 < LARGEST else math.inf
     return SufficientGains(k1, k3, k4, Weights(w_s, 1.0, p))
 
 
@@ -256,8 +266,12 @@ def _groups(c: LoopConstants, *, tracking: bool) -> list[int]:
     return [VELOCITIES] * (c.second_players > 0) + [TRACKING] * (tracking and c.first_players > 0)
 
 
-def theorem_2_thresholds(c: LoopConstants, k2: float, *, margin: float = MARGIN) -> SufficientGains:
+def theorem_2_thresholds(
+    c: LoopConstants, k2: float, *, margin: float = MARGIN, given: Gains | None = None
+) -> SufficientGains:
     """Thresholds without unknown dynamics at rate 0, k4* for k3 at `margin` times k3*.
+
+    k4* is for the k3 of `given` instead where this exceeds k3*.
 
     p minimizes k4* here: larger than for k3* alone, and growing with k3, which keeps k4* bounded.
     k1* = 0: x_f does not feed back into z, y or v, so the loop is a cascade of the rest and of (x_f - z_f)'
@@ -266,14 +280,19 @@ def theorem_2_thresholds(c: LoopConstants, k2: float, *, margin: float = MARGIN)
 
     def thresholds_for(log_p: float) -> SufficientGains:
         p = math.exp(log_p)
-        return sufficient_gains(c, NO_DYNAMICS, k2, margin=margin, tracking=False, estimates_weight=p)
+        return sufficient_gains(
+            c, NO_DYNAMICS, k2, margin=margin, tracking=False, estimates_weight=p, given=given
+        )
 
-    first = sufficient_gains(c, NO_DYNAMICS, k2, margin=margin, tracking=False)
+    first = sufficient_gains(c, NO_DYNAMICS, k2, margin=margin, tracking=False, given=given)
     if c.second_players == 0 or not math.isfinite(first.k4):
         return first
+    largest = max(margin, given.k3 / first.k3) if given is not None and first.k3 > 0.0 else margin
     start = math.log(first.weights.estimates)
-    bounds = (start, start + math.log(2.0 * margin))
-    best = minimize_scalar(lambda log_p: thresholds_for(log_p).k4, bounds=bounds, method="bounded")
+    bounds = (start, start + math.log(2.0 * largest))
+    best = minimize_scalar(
+        lambda log_p: min(thresholds_for(log_p).k4, LARGEST), bounds=bounds, method="bounded"
+    )
     found = thresholds_for(float(best.x))
     return found if found.k4 < first.k4 else first
 

@@ -27,6 +27,9 @@ def analyse(
     radius: Annotated[
         float, typer.Option(help="Distance to the equilibrium that the designed gains guarantee.")
     ] = 0.1,
+    tables: Annotated[  # noqa: FBT002
+        bool, typer.Option("--tables", help="Print every figure and hypothesis after the verdicts.")
+    ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,  # noqa: FBT002
 ) -> None:
     """Tell whether the gains suit the graph: thresholds of the theorems, exact spectrum, guaranteed radius.
@@ -61,7 +64,7 @@ def analyse(
     if as_json:
         typer.echo(json.dumps(found.to_dict(), indent=2))
     else:
-        print_analysis(found)
+        print_analysis(found, tables=tables)
 
 
 def register(app: typer.Typer) -> None:

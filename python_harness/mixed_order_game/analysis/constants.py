@@ -147,13 +147,20 @@ def loop_constants(parameters: GameParameters) -> LoopConstants:
     l_i = ||h_i||: grad_i f_i(x) = (h_i (x) I_D) x + l_i, so this Lipschitz constant is the smallest one.
     """
     h = gradient_map(parameters)
+    eigenvalues = consensus_eigenvalues(parameters.adjacency)
     return LoopConstants(
         parameters=parameters,
         h=h,
-        monotonicity=monotonicity_constant(parameters),
+        monotonicity=float(_without_rounding(np.array(monotonicity_constant(parameters)), h)),
         lipschitz=np.asarray(np.linalg.norm(h, axis=1)),
-        eigenvalues=consensus_eigenvalues(parameters.adjacency),
+        eigenvalues=_without_rounding(eigenvalues, eigenvalues),
     )
+
+
+def _without_rounding(eigenvalues: FloatArray, matrix: FloatArray) -> FloatArray:
+    """Eigenvalues of a matrix (N, N), or of N of them, with 0 for those that rounding alone can make."""
+    rounding = 4.0 * np.finfo(float).eps * len(matrix) * float(np.abs(matrix).max())
+    return np.where(np.abs(eigenvalues) <= rounding, 0.0, eigenvalues)
 
 
 @dataclass(frozen=True, eq=False)

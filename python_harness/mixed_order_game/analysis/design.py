@@ -100,8 +100,8 @@ def sharper_design(game: AnalysedGame, *, k2: float, radius: float, tracking_bou
 def paper_design(game: AnalysedGame, *, radius: float, factor: float = 1.1) -> Design:
     """A design by the paper's own coefficients of Theorem 1; epsilon and beta by the sharper level.
 
-    P = p I with the p that makes k4* smallest; gains `factor` times their thresholds. The level of V(0)
-    takes the weights 1, so vbar_s(0) enters in full.
+    P = p I with the p that makes k4* (k3* without players of order 2) smallest; gains `factor` times their
+    thresholds. The level of V(0) takes the weights 1, so vbar_s(0) enters in full.
     """
     constants = loop_constants(game.parameters)
 
@@ -121,8 +121,9 @@ def paper_design(game: AnalysedGame, *, radius: float, factor: float = 1.1) -> D
         rate = paper_bounds.theorem_1_coefficients(c, gains).rate(c.pair)
         return gains, Certificate(constants, weights, rate), level
 
+    last = "k4" if constants.second_players else "k3"
     best = minimize_scalar(
-        lambda log_p: math.log(attempt(log_p)[0].k4), bounds=(-12.0, 2.0), method="bounded"
+        lambda log_p: math.log(getattr(attempt(log_p)[0], last)), bounds=(-12.0, 2.0), method="bounded"
     )
     gains, certificate, level = attempt(float(best.x))
     return _finished(game, gains, certificate, level, radius)

@@ -32,8 +32,13 @@ def consensus_eigenvalues(adjacency: FloatArray) -> FloatArray:
 
 def is_connected(adjacency: FloatArray) -> bool:
     """Whether the graph with these edge weights (N, N) is connected (the paper's Assumption 2)."""
+    return not unreached(adjacency)
+
+
+def unreached(adjacency: FloatArray) -> list[int]:
+    """Players, 0-based, to which no path leads from player 0 in the graph with these edge weights (N, N)."""
     reached = np.zeros(len(adjacency), dtype=bool)
     reached[0] = True
     for _ in range(len(adjacency)):
         reached |= adjacency[reached].any(axis=0)
-    return bool(reached.all())
+    return np.flatnonzero(~reached).tolist()

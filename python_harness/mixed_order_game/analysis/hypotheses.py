@@ -8,10 +8,10 @@ import numpy as np
 from .constants import LoopConstants, dynamics_bound
 from .design import Design
 from .domain import Domain, initial_errors
-from .game import AnalysedGame
-from .graph import is_connected
+from .game import AnalysedGame, Gains
+from .graph import unreached
 from .network_fit import NetworkFit, mirror_bound
-from .paper_bounds import Thresholds
+from .paper_bounds import ORDER, Thresholds
 
 
 @dataclass(frozen=True)
@@ -33,6 +33,8 @@ def standing_assumptions(game: AnalysedGame, c: LoopConstants) -> list[Hypothesi
         if squares.size
         else f"max eta_i = {slopes:.4g}"
     )
+    apart = [str(player + 1) for player in unreached(p.adjacency)]
+    path = f"; no path from player 1 to {', '.join(apart)}" if apart else ""
     return [
         Hypothesis(
             "Assumption 1: own gradients globally Lipschitz",
@@ -41,8 +43,8 @@ def standing_assumptions(game: AnalysedGame, c: LoopConstants) -> list[Hypothesi
         ),
         Hypothesis(
             "Assumption 2: undirected connected graph",
-            holds=is_connected(p.adjacency),
-            figures=f"lambda_min(L (x) I + A_0) = {c.slowest_consensus:.4g}",
+            holds=not apart and c.slowest_consensus > 0.0,
+            figures=f"lambda_min(L (x) I + A_0) = {c.slowest_consensus:.4g}{path}",
         ),
         Hypothesis(
             "Assumption 3: strongly monotone", holds=c.monotonicity > 0.0, figures=f"m = {c.monotonicity:.4g}"
@@ -105,16 +107,25 @@ def weight_bound(game: AnalysedGame, fit: NetworkFit | None) -> Hypothesis:
     )
 
 
-def gain_thresholds(game: AnalysedGame, limits: Thresholds) -> list[Hypothesis]:
-    """k_i > k_i* for the four gains."""
+def gain_thresholds(game: AnalysedGame, limits: Thresholds, counted: Gains) -> list[Hypothesis]:
+    """k_i > k_i* for the four gains, thresholds for the gains counted."""
+    own = game.gains
     return [
         Hypothesis(
             f"{name} > {name}*",
-            holds=getattr(game.gains, name) > getattr(limits, name),
-            figures=f"{name} = {getattr(game.gains, name):.4g}, {name}* = {getattr(limits, name):.4g} 1/s",
+            holds=getattr(own, name) > getattr(limits, name),
+            figures=f"{name} = {getattr(own, name):.4g}, {name}* = {getattr(limits, name):.4g} 1/s"
+            + told_for(name, counted),
         )
-        for name in ("k2", "k1", "k3", "k4")
+        for name in ORDER
     ]
+
+
+def told_for(name: str, counted: Gains) -> str:
+    """The gains that a threshold is for, as " for k2 = 1"; empty for k2*."""
+    before = {"k2": (), "k4": ("k2", "k3")}.get(name, ("k2",))
+    told = ", ".join(f"{each} = {getattr(counted, each):.4g}" for each in before)
+    return f" for {told}" if told else ""
 
 
 def design_hypotheses(game: AnalysedGame, design: Design) -> list[Hypothesis]:

@@ -153,6 +153,10 @@ def _present(c: PaperConstants, coefficients: Coefficients) -> Coefficients:
     )
 
 
+ORDER = ("k2", "k3", "k1", "k4")
+"""The paper's order of choice: the thresholds of k3 and k1 depend on k2, that of k4 on k2 and k3."""
+
+
 @dataclass(frozen=True)
 class Thresholds:
     """k2*, then k1*(k2), k3*(k2), k4*(k2, k3), in 1/s: each coefficient is positive exactly above its own."""
@@ -190,13 +194,30 @@ def thresholds(formula: Formula, c: PaperConstants, gains: Gains) -> Thresholds:
     )
 
 
+def thresholds_for(
+    formula: Formula, c: PaperConstants, gains: Gains, factor: float
+) -> tuple[Thresholds, Gains]:
+    """Thresholds in the paper's order, each for the given gains before it where these exceed their own.
+
+    A gain that does not exceed its threshold counts as `factor` > 1 times that in the ones after it. So
+    gains above all thresholds returned are those for which every coefficient is positive. Also returns the
+    gains that were counted.
+    """
+    counted = gains
+    for name in ORDER:
+        threshold = getattr(thresholds(formula, c, counted), name)
+        if getattr(gains, name) <= threshold:
+            counted = replace_gain(counted, name, factor * threshold)
+    return thresholds(formula, c, counted), counted
+
+
 def gains_above(formula: Formula, c: PaperConstants, gains: Gains, factor: float) -> Gains:
     """Gains `factor` > 1 times their thresholds, chosen in the paper's order k2, then k1 and k3, then k4.
 
     The other entries of `gains` are kept.
     """
     floor = 1e-6  # a threshold of 0 is met by any positive gain
-    for name in ("k2", "k3", "k1", "k4"):
+    for name in ORDER:
         value = max(factor * getattr(thresholds(formula, c, gains), name), floor)
         gains = replace_gain(gains, name, value)
     return gains

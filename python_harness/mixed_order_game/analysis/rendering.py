@@ -1,4 +1,4 @@
-"""What `mog analyse` prints: one table per section, the hypotheses and the verdicts."""
+"""What `mog analyse` prints: the verdicts, and on request one table per section and the hypotheses."""
 
 from collections.abc import Sequence
 
@@ -10,10 +10,14 @@ from .findings import Analysis, Figure
 from .hypotheses import Hypothesis
 
 
-def print_analysis(analysis: Analysis, console: Console | None = None) -> None:
-    """Print an analysis on stdout or the console given."""
+def print_analysis(analysis: Analysis, console: Console | None = None, *, tables: bool = False) -> None:
+    """Print the verdicts of an analysis, and the tables if wished, on stdout or the console given."""
     console = Console(highlight=False) if console is None else console
     console.print(Text(analysis.title, style="bold"))
+    for verdict in analysis.verdicts:
+        console.print(Text(f"- {verdict}"))
+    if not tables:
+        return
     for section in dict.fromkeys(row.section for row in analysis.rows):
         table = Table("figure", "value", "unit", "meaning", title=Text(section), title_justify="left")
         for row in analysis.rows:
@@ -24,8 +28,6 @@ def print_analysis(analysis: Analysis, console: Console | None = None) -> None:
     console.print(_hypotheses("Theorem 1 for the given gains", analysis.hypotheses))
     for each in analysis.demonstrations:
         console.print(_hypotheses(f"Theorem 1 for the design by {each.name}", each.hypotheses))
-    for verdict in analysis.verdicts:
-        console.print(Text(f"- {verdict}"))
 
 
 def _hypotheses(title: str, hypotheses: Sequence[Hypothesis]) -> Table:
