@@ -214,12 +214,12 @@ def thresholds_for(
 def gains_above(formula: Formula, c: PaperConstants, gains: Gains, factor: float) -> Gains:
     """Gains `factor` > 1 times their thresholds, chosen in the paper's order k2, then k1 and k3, then k4.
 
-    The other entries of `gains` are kept.
+    The other entries of `gains` are kept, and so is a gain whose threshold is 0.
     """
-    floor = 1e-6  # a threshold of 0 is met by any positive gain
     for name in ORDER:
-        value = max(factor * getattr(thresholds(formula, c, gains), name), floor)
-        gains = replace_gain(gains, name, value)
+        threshold = getattr(thresholds(formula, c, gains), name)
+        if threshold > 0.0:
+            gains = replace_gain(gains, name, factor * threshold)
     return gains
 
 
