@@ -68,7 +68,7 @@ fmi2Status get_values(fmi2Component c, const char* function, Type type, const fm
 template <typename Value>
 fmi2Status set_values(fmi2Component c, const char* function, Type type, const fmi2ValueReference vr[], size_t nvr,
                       const Value value[]) {
-  return status(guarded(c, Call::set_values, function, [&](Component& component) {
+  return status(guarded(c, Call::set_discrete_values, function, [&](Component& component) {
     const auto references = array(vr, nvr, "vr");
     const auto values = array(value, nvr, "value");
     std::vector<Real> numbers(values.begin(), values.end());
@@ -219,7 +219,7 @@ fmi2Status fmi2GetString(fmi2Component c, const fmi2ValueReference /*vr*/[], siz
 }
 
 fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2Real value[]) {
-  return status(guarded(c, Call::set_values, "fmi2SetReal", [&](Component& component) {
+  return status(guarded(c, Call::set_reals, "fmi2SetReal", [&](Component& component) {
     const auto references = array(vr, nvr, "vr");
     component.instance.set(Type::real, references, array(value, nvr, "value").data());
   }));
@@ -234,7 +234,7 @@ fmi2Status fmi2SetBoolean(fmi2Component c, const fmi2ValueReference vr[], size_t
 }
 
 fmi2Status fmi2SetString(fmi2Component c, const fmi2ValueReference /*vr*/[], size_t nvr, const fmi2String /*value*/[]) {
-  return status(guarded(c, Call::set_values, "fmi2SetString", [&](Component&) { no_strings(nvr); }));
+  return status(guarded(c, Call::set_discrete_values, "fmi2SetString", [&](Component&) { no_strings(nvr); }));
 }
 
 fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate* FMUstate) {

@@ -177,24 +177,36 @@ void Instance::get(Type type, std::span<const std::uint32_t> references, Real* v
 void Instance::set(Type type, std::span<const std::uint32_t> references, const Real* values) {
   const ModelVariables& variables = model_.variables;
   bool equilibrium_moved = false;
+  bool state_set = false;
   Change change = Change::none;
   for (std::size_t k = 0; k < references.size(); ++k) {
     const int reference = known(references[k], type);
     const Family& family = variables.family(reference);
     if (!may_be_set(family, phase_)) {
-      throw Error(variables.name(reference) + " " + why_not_settable(family, phase_));
+      throw Error(variables.name(reference) + " " + why_not_settable(family, phase_, interface_));
     }
     if (!contains(family.range, values[k])) {
       throw Error(variables.name(reference) + " was set to " + text_of(values[k]) + ", expected " +
                   std::string(expectation(family.range)));
     }
+    if (family.state >= 0) {
+      state_set = true;
+      continue;
+    }
     equilibrium_moved = equilibrium_moved || family.moves_equilibrium;
     change = std::max(change, family.causality == Causality::input ? Change::input : Change::parameters);
   }
+  if (state_set) scratch_.assign(standing().state, standing().state + initial_state_.size());
   for (std::size_t k = 0; k < references.size(); ++k) {
     const auto reference = static_cast<int>(references[k]);
-    variables.family(reference).write(settings_, variables.variable(reference).slot, values[k]);
+    const Variable& variable = variables.variable(reference);
+    if (variable.state >= 0) {
+      scratch_[at(variable.state)] = values[k];
+    } else {
+      variables.family(reference).write(settings_, variable.slot, values[k]);
+    }
   }
+  if (state_set) model_exchange_->set_state(scratch_);
   settings_changed(change, equilibrium_moved);
 }
 

@@ -24,13 +24,13 @@ constexpr unsigned co_simulation = bit(Interface::co_simulation);
 constexpr unsigned model_exchange = bit(Interface::model_exchange);
 constexpr unsigned both = co_simulation | model_exchange;
 
-// The standard's tables for co-simulation and model exchange. Allowed beyond them, because importers rely on it and
-// nothing is lost: reading any variable before initialization ends, setting inputs and reading or restoring states
-// right after instantiation, reading derivatives in initialization mode and nominal values in every state, and all that
-// still makes sense after a failed integration.
+// The tables of calling sequences in sections 3.2.3 and 4.2.4 of FMI 2.0.5, with their notes. "beyond" is what is
+// allowed besides, on purpose. Its states stepInProgress, stepFailed and stepCanceled are never reached: no step is
+// asynchronous or ends in fmi2Discard.
 struct CallRule {
   Call call;
-  unsigned legal;
+  unsigned standard;
+  unsigned beyond = 0;
   unsigned interfaces = both;
 };
 constexpr CallRule call_rules[] = {
@@ -38,42 +38,55 @@ constexpr CallRule call_rules[] = {
     {Call::setup_experiment, fresh},
     {Call::enter_initialization, fresh},
     {Call::exit_initialization, initializing},
-    {Call::terminate, running | failed},
+    // many importers terminate whatever happened before
+    {Call::terminate, running, failed},
     {Call::reset, always},
-    {Call::get_values, always},
-    {Call::set_values, fresh | initializing | running},
+    // importers look at start values; likewise any variable can be read in initialization mode, not only outputs and
+    // initial unknowns (note 2), and by co-simulation between a setting call and the next step
+    {Call::get_values, initializing | running | ended | failed, fresh},
+    {Call::set_reals, fresh | initializing | running},
+    {Call::set_discrete_values, fresh | initializing | stepping | at_event},
+    // not in the error state, where the standard wants something to debug: a run can never go on from there
     {Call::get_state, fresh | initializing | running | ended},
     {Call::set_state, always},
     {Call::free_state, always},
     {Call::serialize_state, always},
-    {Call::get_directional_derivative, initializing | running | ended},
-    {Call::set_input_derivatives, fresh | initializing | stepping, co_simulation},
-    {Call::get_output_derivatives, stepping | ended | failed, co_simulation},
-    {Call::do_step, stepping, co_simulation},
-    {Call::cancel_step, 0, co_simulation},  // only while an asynchronous step runs, and there are none
-    {Call::get_status, always, co_simulation},
-    {Call::enter_event_mode, at_event | continuous, model_exchange},
-    {Call::new_discrete_states, at_event, model_exchange},
-    {Call::enter_continuous_time_mode, at_event, model_exchange},
-    {Call::completed_integrator_step, continuous, model_exchange},
-    {Call::set_time, at_event | continuous, model_exchange},
-    {Call::set_continuous_states, continuous, model_exchange},
-    {Call::get_continuous_states, initializing | at_event | continuous | ended, model_exchange},
-    {Call::get_derivatives, initializing | at_event | continuous | ended, model_exchange},
-    {Call::get_event_indicators, initializing | at_event | continuous | ended, model_exchange},
-    {Call::get_nominals, always, model_exchange},
+    {Call::get_directional_derivative, initializing | running | ended | failed},
+    {Call::set_input_derivatives, fresh | initializing | stepping, 0, co_simulation},
+    {Call::get_output_derivatives, stepping | ended | failed, 0, co_simulation},
+    {Call::do_step, stepping, 0, co_simulation},
+    {Call::cancel_step, 0, 0, co_simulation},
+    // how far the run came is asked after a step that failed
+    {Call::get_status, stepping | ended, failed, co_simulation},
+    {Call::enter_event_mode, at_event | continuous, 0, model_exchange},
+    {Call::new_discrete_states, at_event, 0, model_exchange},
+    {Call::enter_continuous_time_mode, at_event, 0, model_exchange},
+    {Call::completed_integrator_step, continuous, 0, model_exchange},
+    // in event mode for models without continuous states only (note 8); importers that never leave it set time there
+    {Call::set_time, continuous, at_event, model_exchange},
+    {Call::set_continuous_states, continuous, 0, model_exchange},
+    {Call::get_continuous_states, initializing | at_event | continuous | ended, 0, model_exchange},
+    {Call::get_derivatives, initializing | at_event | continuous | ended, 0, model_exchange},
+    {Call::get_event_indicators, initializing | at_event | continuous | ended, 0, model_exchange},
+    {Call::get_nominals, always, 0, model_exchange},
 };
 
+// Notes 1 and 3 to 6: which variables the calls that set values may name.
 struct VariableRule {
   Causality causality;
   Variability variability;
-  unsigned settable;
+  unsigned standard;
+  unsigned beyond = 0;
 };
 constexpr VariableRule variable_rules[] = {
     {Causality::parameter, Variability::fixed, fresh | initializing},
     {Causality::parameter, Variability::tunable, fresh | initializing | stepping | at_event},
-    {Causality::input, Variability::continuous, fresh | initializing | running},
+    // importers set all start values at once
+    {Causality::input, Variability::continuous, initializing | running, fresh},
 };
+// By model exchange the importer holds the states (note 5, since 2.0.1); one that never leaves event mode sets them
+// there, beyond the standard.
+constexpr unsigned states_settable = continuous | at_event;
 
 constexpr std::string_view phase_names[] = {"instantiated", "initialization mode",  "step complete",
                                             "event mode",   "continuous-time mode", "terminated",
@@ -89,6 +102,22 @@ constexpr bool in_order_of_calls() {
 static_assert(in_order_of_calls());
 
 constexpr const CallRule& rule_of(Call call) { return call_rules[static_cast<std::size_t>(call)]; }
+
+/// The phases in which a variable of this family may be set.
+unsigned settable(const Family& family) {
+  if (family.state >= 0) return states_settable;
+  for (const VariableRule& rule : variable_rules) {
+    if (rule.causality == family.causality && rule.variability == family.variability) {
+      return rule.standard | rule.beyond;
+    }
+  }
+  return 0;
+}
+
+/// The phases that an instance can be in; only an integration of its own can fail.
+constexpr unsigned phases_of(Interface interface) {
+  return interface == Interface::co_simulation ? always & ~(at_event | continuous) : always & ~(stepping | failed);
+}
 
 }  // namespace
 
@@ -110,32 +139,30 @@ std::string_view kind_of(const Family& family) {
   return "";
 }
 
-bool is_legal(Call call, Phase phase) { return (rule_of(call).legal & bit(phase)) != 0; }
+bool is_legal(Call call, Phase phase) {
+  const CallRule& rule = rule_of(call);
+  return ((rule.standard | rule.beyond) & bit(phase)) != 0;
+}
 
 bool belongs_to(Call call, Interface interface) { return (rule_of(call).interfaces & bit(interface)) != 0; }
 
 std::string legal_phases(Call call, Interface interface) {
-  const unsigned of_the_other = interface == Interface::co_simulation ? at_event | continuous : stepping;
   std::string text;
   for (int phase = 0; phase < phases; ++phase) {
-    if ((rule_of(call).legal & ~of_the_other & bit(static_cast<Phase>(phase))) == 0) continue;
+    const auto one = static_cast<Phase>(phase);
+    if (!is_legal(call, one) || (phases_of(interface) & bit(one)) == 0) continue;
     text += (text.empty() ? "" : " or ") + std::string(phase_names[phase]);
   }
   return text.empty() ? "no state" : text;
 }
 
-bool may_be_set(const Family& family, Phase phase) {
-  for (const VariableRule& rule : variable_rules) {
-    if (rule.causality == family.causality && rule.variability == family.variability) {
-      return (rule.settable & bit(phase)) != 0;
-    }
-  }
-  return false;
-}
+bool may_be_set(const Family& family, Phase phase) { return (settable(family) & bit(phase)) != 0; }
 
-std::string why_not_settable(const Family& family, Phase phase) {
-  std::string text = "is " + std::string(kind_of(family));
-  if (may_be_set(family, Phase::instantiated)) {
+std::string why_not_settable(const Family& family, Phase phase, Interface interface) {
+  const bool some_time = (settable(family) & phases_of(interface)) != 0;
+  const std::string_view kind = some_time && family.state >= 0 ? "a state" : kind_of(family);
+  std::string text = "is " + std::string(kind);
+  if (some_time) {
     text += ", which cannot be set in the state " + std::string(name_of(phase));
   } else {
     text += " and cannot be set";

@@ -31,7 +31,8 @@ enum class Call : std::uint8_t {
   terminate,
   reset,
   get_values,
-  set_values,
+  set_reals,
+  set_discrete_values,  ///< of the other types
   get_state,
   set_state,
   free_state,
@@ -66,7 +67,7 @@ std::string_view kind_of(const Family& family);
 
 bool may_be_set(const Family& family, Phase phase);
 /// Why a variable of this family cannot be set now.
-std::string why_not_settable(const Family& family, Phase phase);
+std::string why_not_settable(const Family& family, Phase phase, Interface interface);
 
 std::string_view name_of(Phase phase);
 std::string_view name_of(Interface interface);

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from ctypes import CDLL, c_char_p, c_double, c_int, c_size_t, c_uint, c_void_p, create_string_buffer, pointer
 from pathlib import Path
 from typing import Any, Self
@@ -11,12 +11,6 @@ from typing import Any, Self
 import fmpy
 
 OK = 0
-EXPLAINED = (
-    "*yes*: as in the standard; *beyond*: allowed beyond the standard, because importers rely on it or"
-    " nothing is lost; *refused*: fmi2Error although the standard would allow it; empty: fmi2Error, as in"
-    " the standard.\n"
-)
-
 FRESH, INITIALIZING, RUNNING, ENDED, FAILED = (
     "instantiated",
     "initialization mode",
@@ -27,21 +21,32 @@ FRESH, INITIALIZING, RUNNING, ENDED, FAILED = (
 AT_EVENT, CONTINUOUS = "event mode", "continuous-time mode"
 EVERY = frozenset((FRESH, INITIALIZING, RUNNING, AT_EVENT, CONTINUOUS, ENDED, FAILED))
 READ = EVERY - {FRESH}
+NONE: frozenset[str] = frozenset()
 
 STANDARD: Mapping[str, frozenset[str]] = {
+    "fmi2GetTypesPlatform": EVERY,
+    "fmi2GetVersion": EVERY,
     "fmi2SetDebugLogging": EVERY,
+    "fmi2FreeInstance": EVERY,
     "fmi2SetupExperiment": frozenset({FRESH}),
     "fmi2EnterInitializationMode": frozenset({FRESH}),
     "fmi2ExitInitializationMode": frozenset({INITIALIZING}),
     "fmi2Terminate": frozenset({RUNNING, AT_EVENT, CONTINUOUS}),
     "fmi2Reset": EVERY,
-    "fmi2GetReal": READ,
-    "fmi2GetInteger": READ,
-    "fmi2GetBoolean": READ,
+    "fmi2GetReal (output)": READ,
+    "fmi2GetReal (initial unknown)": READ,
+    "fmi2GetReal (parameter)": READ - {INITIALIZING},
+    "fmi2GetInteger (local variable)": READ - {INITIALIZING},
+    "fmi2GetBoolean (parameter)": READ - {INITIALIZING},
+    "fmi2GetString (no variable)": READ,
     "fmi2SetReal (input)": frozenset({INITIALIZING, RUNNING, AT_EVENT, CONTINUOUS}),
     "fmi2SetReal (tunable parameter)": frozenset({FRESH, INITIALIZING, RUNNING, AT_EVENT}),
     "fmi2SetReal (fixed parameter)": frozenset({FRESH, INITIALIZING}),
+    "fmi2SetReal (state)": frozenset({CONTINUOUS}),
+    "fmi2SetReal (derivative)": NONE,
+    "fmi2SetInteger (no variable)": frozenset({FRESH, INITIALIZING, RUNNING, AT_EVENT}),
     "fmi2SetBoolean (fixed parameter)": frozenset({FRESH, INITIALIZING}),
+    "fmi2SetString (no variable)": frozenset({FRESH, INITIALIZING, RUNNING, AT_EVENT}),
     "fmi2GetFMUstate": EVERY,
     "fmi2SetFMUstate": EVERY,
     "fmi2FreeFMUstate": EVERY,
@@ -52,29 +57,85 @@ STANDARD: Mapping[str, frozenset[str]] = {
     "fmi2SetRealInputDerivatives": frozenset({FRESH, INITIALIZING, RUNNING}),
     "fmi2GetRealOutputDerivatives": frozenset({RUNNING, ENDED, FAILED}),
     "fmi2DoStep": frozenset({RUNNING}),
-    "fmi2CancelStep": frozenset(),
-    "fmi2GetStatus": frozenset({RUNNING, ENDED, FAILED}),
-    "fmi2GetRealStatus": frozenset({RUNNING, ENDED, FAILED}),
-    "fmi2GetBooleanStatus": frozenset({RUNNING, ENDED, FAILED}),
-    "fmi2GetStringStatus": frozenset({RUNNING, ENDED, FAILED}),
+    "fmi2CancelStep": NONE,
+    "fmi2GetStatus": frozenset({RUNNING, ENDED}),
+    "fmi2GetRealStatus": frozenset({RUNNING, ENDED}),
+    "fmi2GetIntegerStatus": frozenset({RUNNING, ENDED}),
+    "fmi2GetBooleanStatus": frozenset({RUNNING, ENDED}),
+    "fmi2GetStringStatus": frozenset({RUNNING, ENDED}),
     "fmi2EnterEventMode": frozenset({AT_EVENT, CONTINUOUS}),
     "fmi2NewDiscreteStates": frozenset({AT_EVENT}),
     "fmi2EnterContinuousTimeMode": frozenset({AT_EVENT}),
     "fmi2CompletedIntegratorStep": frozenset({CONTINUOUS}),
-    "fmi2SetTime": frozenset({AT_EVENT, CONTINUOUS}),
+    "fmi2SetTime": frozenset({CONTINUOUS}),
     "fmi2SetContinuousStates": frozenset({CONTINUOUS}),
     "fmi2GetContinuousStates": READ,
-    "fmi2GetDerivatives": READ - {INITIALIZING},
+    "fmi2GetDerivatives": READ,
     "fmi2GetEventIndicators": READ,
-    "fmi2GetNominalsOfContinuousStates": EVERY - {INITIALIZING},
+    "fmi2GetNominalsOfContinuousStates": EVERY,
 }
-"""The tables of calling sequences in FMI 2.0; an asynchronous or failed step is the state error here."""
+"""The tables of sections 3.2.3 and 4.2.4 of FMI 2.0.5 with their notes, for the states that are reached."""
+
+READING, STATUS = r"fmi2Get(Real|Integer|Boolean|String) .*", r"fmi2Get(Real|Boolean|String)?Status"
+
+BEYOND: Sequence[tuple[str, frozenset[str], str]] = (
+    (
+        READING,
+        frozenset({FRESH}),
+        "any variable can be read before initialization, because importers show start values",
+    ),
+    (
+        r"fmi2Get\w+ \((parameter|local variable)\)",
+        frozenset({INITIALIZING}),
+        "in initialization mode likewise, not only outputs and initial unknowns",
+    ),
+    (
+        r"fmi2SetReal \(input\)",
+        frozenset({FRESH}),
+        "inputs can be set before initialization, because importers set all start values at once",
+    ),
+    (r"fmi2Terminate", frozenset({FAILED}), "a failed run can be terminated, because importers do so always"),
+    (STATUS, frozenset({FAILED}), "how far a failed run came can be asked"),
+    (
+        r"fmi2SetReal \(state\)|fmi2SetTime",
+        frozenset({AT_EVENT}),
+        "states and time can be set in event mode, because CasADi's DaeBuilder never leaves it",
+    ),
+)
+"""What is allowed beyond the standard: calls (a regular expression), states, and why."""
+
+REFUSED: Sequence[tuple[str, frozenset[str], str]] = (
+    (
+        r"fmi2GetFMUstate",
+        frozenset({FAILED}),
+        "a failed run has no state to save, because none could go on from it",
+    ),
+    (
+        r"fmi2GetIntegerStatus",
+        frozenset({RUNNING, ENDED}),
+        "nothing that could be asked for has the type fmi2Integer",
+    ),
+)
+"""What is refused although the standard allows it, likewise."""
 
 CO_SIMULATION_ONLY = re.compile(r"fmi2(SetRealInput|GetRealOutput|DoStep|CancelStep|Get\w*Status)")
 MODEL_EXCHANGE_ONLY = re.compile(
     r"fmi2(EnterEvent|NewDiscrete|EnterContinuous|Completed|SetTime|SetContinuous|GetContinuous|GetDerivatives"
     r"|GetEvent|GetNominals)"
 )
+
+
+EXAMPLES: Mapping[str, tuple[str, float]] = {
+    "(input)": ("d_ext[1,1]", 1.0),
+    "(parameter)": ("k1", 1.0),
+    "(tunable parameter)": ("k1", 1.0),
+    "(fixed parameter)": ("x0[1,1]", 1.0),
+    "(state)": ("x[1,1]", 1.0),
+    "(output)": ("u[1,1]", 1.0),
+    "(initial unknown)": ("x_star[1,1]", 1.0),
+    "(derivative)": ("der(x[1,1])", 1.0),
+}
+"""A Real variable of each kind and a value for it."""
 
 
 class Library:
@@ -146,13 +207,19 @@ class Instance:
     def perform(self, call: str) -> int:
         """Status of a call whose arguments are fine in themselves."""
         function, _, kind = call.partition(" ")
-        if function == "fmi2SetReal":
-            name = {"(input)": "d_ext[1,1]", "(tunable parameter)": "k1", "(fixed parameter)": "x0[1,1]"}[
-                kind
-            ]
-            return self.set(name, 1.0)
-        if function == "fmi2SetBoolean":
-            return self.set("robust", value=True)
+        if function in ("fmi2GetTypesPlatform", "fmi2GetVersion"):
+            text = getattr(self.library.functions, function)
+            text.restype = c_char_p
+            return OK if text() in (b"default", b"2.0") else 1
+        if function == "fmi2FreeInstance":
+            self.library.functions.fmi2FreeInstance(self.component)
+            self.component = c_void_p()
+            return OK
+        if kind == "(no variable)":
+            return self.call(function, None, c_size_t(0), None)
+        if function in ("fmi2SetReal", "fmi2SetBoolean"):
+            name, value = EXAMPLES[kind] if function == "fmi2SetReal" else ("robust", True)
+            return self.set(name, value)
         if "FMUstate" in function:
             return self._with_state(function)
         one, real, integer = c_size_t(1), pointer(c_double()), pointer(c_int(1))
@@ -162,7 +229,7 @@ class Instance:
         arguments: Mapping[str, tuple[Any, ...]] = {
             "fmi2SetDebugLogging": (0, c_size_t(0), None),
             "fmi2SetupExperiment": (0, c_double(0.0), c_double(0.0), 0, c_double(0.0)),
-            "fmi2GetReal": (output, one, real),
+            "fmi2GetReal": (self._reference(EXAMPLES.get(kind, EXAMPLES["(output)"])[0]), one, real),
             "fmi2GetInteger": (self._reference("solver_steps"), one, integer),
             "fmi2GetBoolean": (self._reference("robust"), one, integer),
             "fmi2GetDirectionalDerivative": (output, one, disturbance, one, real, real),
@@ -171,6 +238,7 @@ class Instance:
             "fmi2DoStep": (c_double(0.0), c_double(1e-3), 1),
             "fmi2GetStatus": (0, integer),
             "fmi2GetRealStatus": (2, real),
+            "fmi2GetIntegerStatus": (0, integer),
             "fmi2GetBooleanStatus": (3, integer),
             "fmi2GetStringStatus": (1, pointer(c_char_p())),
             "fmi2NewDiscreteStates": (create_string_buffer(64),),
@@ -229,14 +297,41 @@ def legal(library: Library, interface: str) -> dict[str, dict[str, bool]]:
     return answers
 
 
+def deviations(rules: Sequence[tuple[str, frozenset[str], str]], call: str) -> frozenset[str]:
+    """States in which a call deviates from the standard by these rules."""
+    return NONE.union(*(states for calls, states, _ in rules if re.fullmatch(calls, call)))
+
+
+def expected(call: str) -> frozenset[str]:
+    """States in which a call must succeed: as in the standard, but for the deviations that are listed."""
+    return (STANDARD[call] | deviations(BEYOND, call)) - deviations(REFUSED, call)
+
+
+def explanation() -> str:
+    """What the tables of calls say and where they deviate from the standard (Markdown)."""
+    lines = [
+        "## Calls and states\n",
+        "Every cell of these tables, after those of FMI 2.0.5 with their notes, is found by calling the"
+        " function in that state. *yes*: as in the standard; *beyond*: allowed beyond it; *refused*:"
+        " fmi2Error although it would allow it; empty: fmi2Error, as in the standard.\n",
+        "Allowed beyond it on purpose:\n",
+        *(f"- {reason};" for *_, reason in BEYOND),
+        "- in co-simulation, variables can be read after others were set and before the next step;",
+        "- only a failed integration leads to the error state; other refused calls change nothing.\n",
+        "Refused on purpose:\n",
+        *(f"- {reason};" for *_, reason in REFUSED[:-1]),
+        f"- {REFUSED[-1][-1]}.",
+    ]
+    return "\n".join(lines) + "\n"
+
+
 def table_of_calls(library: Library, interface: str) -> str:
     """As Markdown."""
     words = {(True, True): "yes", (True, False): "beyond", (False, True): "refused", (False, False): ""}
     answers = legal(library, interface)
     states = list(next(iter(answers.values())))
     lines = [
-        f"## Calls and states: {interface}\n",
-        EXPLAINED,
+        f"### {interface[0].upper()}{interface[1:]}\n",
         f"| call | {' | '.join(states)} |",
         "|---|" + "---|" * len(states),
     ]

@@ -18,7 +18,7 @@ import fmpy
 
 from mixed_order_game import default_fmu
 
-from .calls_and_states import Library, table_of_calls
+from .calls_and_states import Library, explanation, table_of_calls
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -93,7 +93,7 @@ BEHAVIOURS = (
 
 def page(fmu: Path) -> str:
     """The whole page (Markdown)."""
-    parts = [HEAD, capabilities(fmu), behaviours()]
+    parts = [HEAD, capabilities(fmu), behaviours(), explanation()]
     with tempfile.TemporaryDirectory() as folder:
         library = Library(Path(fmpy.extract(str(fmu), unzipdir=folder)))
         parts += [table_of_calls(library, interface) for interface in flags(fmu)]

@@ -9,6 +9,8 @@ from __future__ import annotations
 import csv
 import math
 import os
+import re
+import shutil
 import subprocess
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -23,7 +25,7 @@ from mixed_order_game import read_model
 ROOT = Path(__file__).resolve().parents[2]
 TOOLS = ROOT / "build" / "compliance"
 HERE = Path(__file__).parent
-REFERENCE = ROOT / "tests" / "reference" / "five_vehicles.npz"
+REFERENCES = ROOT / "tests" / "reference"
 STEP, STEPS, EVERY = 0.02, 1000, 5  # s; results every 0.1 s
 TOLERANCE = 1e-8
 BOUND = 2e-5
@@ -89,6 +91,12 @@ def tools() -> list[Tool]:
         Tool("fmi-sim, Rust", "0.7.0", simulation, fmi_sim),
         Tool("FMPy", version("fmpy"), "model exchange with CVode, 20 s", fmpy_exchange),
         Tool("fmi-sim, Rust", "0.7.0", "model exchange with explicit Euler, 5 s", fmi_sim_exchange),
+        Tool(
+            "CasADi, DaeBuilder",
+            pinned("casadi"),
+            "model exchange with CVODES and the FMU's Jacobian, 8 s",
+            daebuilder,
+        ),
     ]
 
 
@@ -194,6 +202,27 @@ def fmi_sim_exchange(fmu: Path) -> str:
     return compared(on_grid(columns(results)), EULER_BOUND, 5.0)
 
 
+def daebuilder(_: Path) -> str:
+    """CasADi's DaeBuilder, which knows no events: a game in which no weights reach their bound."""
+    game, stop, intervals = "weighted_graph", 8, 100
+    fmu, results = TOOLS / f"{game}.fmu", TOOLS / "daebuilder.csv"
+    run([ROOT / ".venv/bin/mog", "build", REFERENCES / "games" / f"{game}.toml", "--output", fmu])
+    variables = read_model(fmu).variables
+    names = [name for name in variables if name.partition("[")[0] in ("x", "v", "z")]
+    run([TOOLS / ".venv/bin/python", HERE / "daebuilder_integrate.py", fmu, stop, intervals, results, *names])
+    run_snippet_of_importers_page("CasADi", fmu.parent)
+    return compared(columns(results), EXCHANGE_BOUND, stop, game)
+
+
+def run_snippet_of_importers_page(section: str, folder: Path) -> None:
+    """Run the Python snippets of a section of the page on importers, on the paper's example."""
+    page = (ROOT / "python_harness" / "docs" / "importers.md").read_text(encoding="utf-8")
+    text = page.partition(f"\n## {section}\n")[2].partition("\n## ")[0]
+    snippet = "\n".join(re.findall(r"^```python\n(.*?)^```", text, re.MULTILINE | re.DOTALL))
+    shutil.copyfile(ROOT / "build/fmu/MixedOrderGame.fmu", folder / "MixedOrderGame.fmu")
+    run([TOOLS / ".venv/bin/python", "-c", snippet], folder)
+
+
 def on_grid(results: Columns) -> Columns:
     """The samples at the oracle's times."""
     intervals = results["time"] / (STEP * EVERY)
@@ -208,11 +237,11 @@ def simulated(command: Sequence[object], fmu: Path) -> str:
     return compared(columns(results))
 
 
-def run(command: Sequence[object]) -> str:
-    """What a command prints. Raises FindingError if it fails."""
+def run(command: Sequence[object], folder: Path | None = None) -> str:
+    """What a command prints, run in a folder. Raises FindingError if it fails."""
     words = [str(word) for word in command]
     environment = {**os.environ, "NO_COLOR": "1", "COLUMNS": "200"}
-    done = subprocess.run(words, capture_output=True, text=True, check=False, env=environment)
+    done = subprocess.run(words, capture_output=True, text=True, check=False, env=environment, cwd=folder)
     if done.returncode != 0:
         raise FindingError(
             f"{Path(words[0]).name} ended with {done.returncode}: {done.stderr or done.stdout}"
@@ -232,16 +261,18 @@ def outputs(fmu: Path) -> list[str]:
     return [name for name, variable in read_model(fmu).variables.items() if variable.causality == "output"]
 
 
-def compared(results: Columns, bound: float = BOUND, stop: float = STEP * STEPS) -> str:
+def compared(
+    results: Columns, bound: float = BOUND, stop: float = STEP * STEPS, case: str = "five_vehicles"
+) -> str:
     """The largest difference from the oracle. Raises FindingError if something is missing or differs."""
-    with np.load(REFERENCE) as file:
-        reference = {name: file[name] for name in ("t", "x", "v", "u", "nash_error")}
-    time = results["time"]
-    sample = np.rint(time / (STEP * EVERY)).astype(int)
+    with np.load(REFERENCES / f"{case}.npz") as file:
+        reference = {name: file[name] for name in ("t", "x", "v", "z", "u", "nash_error")}
+    time, interval = results["time"], float(reference["t"][1])
+    sample = np.rint(time / interval).astype(int)
     regular = np.allclose(time, reference["t"][sample], rtol=0.0, atol=1e-9)
-    if not regular or len(set(sample)) < round(stop / (STEP * EVERY)):
+    if not regular or len(set(sample)) < round(stop / interval):
         raise FindingError(
-            f"{len(time)} results from {time[0]:g} to {time[-1]:g} s, not one every {STEP * EVERY:g} s"
+            f"{len(time)} results from {time[0]:g} to {time[-1]:g} s, not one every {interval:g} s"
         )
     largest = 0.0
     for name, values in results.items():

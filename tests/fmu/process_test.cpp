@@ -108,6 +108,11 @@ TEST(Behaviour20FailedIntegration, IsAnErrorFromWhichResetAndRestoreHelp) {
   double time = 0.0;
   ASSERT_EQ(fmi2GetRealStatus(c, fmi2LastSuccessfulTime, &time), fmi2OK);
   EXPECT_EQ(time, 1e-5);
+  const fmi2ValueReference known = slave.reference("d_ext[1,1]");
+  const fmi2ValueReference unknown = slave.reference("u[1,1]");
+  const double one = 1.0;
+  double derivative = 0.0;
+  EXPECT_EQ(fmi2GetDirectionalDerivative(c, &unknown, 1, &known, 1, &one, &derivative), fmi2OK);
   fmi2Boolean terminated = fmi2True;
   ASSERT_EQ(fmi2GetBooleanStatus(c, fmi2Terminated, &terminated), fmi2OK);
   EXPECT_EQ(terminated, fmi2False);
