@@ -119,6 +119,9 @@ toml::table parse_toml(std::string_view text) {
     throw GameError("the game definition has " + in_digits(text.size()) + " bytes, expected at most " +
                     in_digits(most_text));
   }
+  if (text.starts_with("\xFF\xFE") || text.starts_with("\xFE\xFF")) {
+    throw GameError("the game definition is UTF-16 text, expected UTF-8");
+  }
   refuse_endless_keys(text);
   try {
     return toml::parse(text);

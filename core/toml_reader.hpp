@@ -15,7 +15,8 @@
 
 namespace mixed_order_game {
 
-/// Parses a document. Throws GameError with line and column when it is not TOML, and when it is too large.
+/// Parses a document in UTF-8; a byte order mark at its beginning means nothing. Throws GameError with line and column
+/// when it is not TOML, and when it is too large.
 toml::table parse_toml(std::string_view text);
 
 /// One entry, present or not; every reading function throws GameError when the entry is not what it reads.

@@ -1,7 +1,7 @@
 """Distributed Nash equilibrium seeking for mixed-order games, as an FMU.
 
 >>> import mixed_order_game as mog
->>> result = mog.run(mog.default_fmu(), start_values={"k1": 12.0})
+>>> result = mog.run("five_vehicles", start_values={"k1": 12.0})
 >>> result.x.shape  # time, player, coordinate
 (1001, 5, 2)
 

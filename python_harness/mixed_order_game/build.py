@@ -6,6 +6,7 @@ licenses/ and model.png, for this machine's platform or for all of them; in its 
 """
 
 import hashlib
+import os
 import platform
 import subprocess
 import sys
@@ -13,27 +14,31 @@ import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
-from .errors import BuildError, GameError
+from .errors import BuildError, GameError, reason
 from .packaging import PackagingError, write_fmu
+from .reading import expect_file, suffix_of
 
 DEFAULT_GAME = "five_vehicles"
 """The paper's example."""
+
+GAME_FILE = "a game file (.toml)"
+SOURCE = f"an FMU (.fmu) or {GAME_FILE}"
+SOURCE_OR_RESULT = f"an FMU (.fmu), {GAME_FILE} or a result (.parquet, .csv)"
 
 TOOL = "mixed-order-game-description"
 ARM_LINUX = "aarch64-linux"
 
 
 def build_fmu(game: Path | str, output: Path | str, *, arm_linux: bool | None = None) -> Path:
-    """Make the FMU of a game file (TOML) and return the path written, `output`.
+    """Make the FMU of a game file (TOML), or of a game of the package by its name; return `output`.
 
     It holds the libraries of all platforms that the package carries. With `arm_linux`, the default on such a
     machine, it is for 64-bit Arm Linux alone: its library lies in linux64 too, where most importers look.
     Equal inputs give equal bytes. Raises GameError if the file is missing or breaks the definition of a game,
     BuildError if the installation lacks the compiled parts or the archive cannot be written.
     """
-    game, output = Path(game), Path(output)
-    if not game.is_file():
-        raise GameError(f"there is no game file {game}")
+    game, output = game_file(game), Path(output)
+    expect_file(game, "game file", GameError)
     native = native_directory()
     with tempfile.TemporaryDirectory(prefix="mixed-order-game-") as folder:
         description, extra = Path(folder) / "modelDescription.xml", Path(folder) / "extra"
@@ -53,7 +58,7 @@ def build_fmu(game: Path | str, output: Path | str, *, arm_linux: bool | None = 
                 extra=extra,
             )
         except (PackagingError, OSError) as error:
-            raise BuildError(f"cannot write {output}: {error}") from error
+            raise BuildError(f"cannot write {output}: {reason(error)}") from error
 
 
 def default_fmu() -> Path:
@@ -65,16 +70,15 @@ def default_fmu() -> Path:
 
 
 def cached_fmu(game: Path | str) -> Path:
-    """The FMU of a game file, made on first use and kept in the user's cache folder.
+    """The FMU of a game file, or of a game of the package by its name, kept in the user's cache folder.
 
     The entry's name holds a fingerprint of the game, the compiled parts and the documentation, so that a
     changed file gives a new FMU. Raises as build_fmu does.
     """
     import platformdirs
 
-    game = Path(game)
-    if not game.is_file():
-        raise GameError(f"there is no game file {game}")
+    game = game_file(game)
+    expect_file(game, "game file", GameError)
     fingerprint = hashlib.sha256(game.read_bytes())
     native = native_directory()
     fingerprint.update(_platform().encode())
@@ -110,22 +114,35 @@ def shipped_games() -> dict[str, Path]:
     return games
 
 
-def game_file(game: Path) -> Path:
-    """The game file meant by an argument: a file, or a game of the package by its name. Raises GameError."""
-    if game.suffix == ".toml":
-        return game
-    if game.suffix:
-        raise GameError(f"{game} is neither an FMU (.fmu) nor a game file (.toml)")
-    return shipped_game(str(game))
+def source_of(game: Path | str | None, expected: str = SOURCE) -> Path:
+    """The FMU or game file meant: a file, a game of the package by its name, the paper's example for None.
 
-
-def fmu_of(game: Path | None) -> Path:
-    """The FMU meant by an argument, the paper's for None; a game is made into one and kept in the cache."""
+    Raises GameError, which ends with what is expected, for anything else; whether a file exists is not asked.
+    """
     if game is None:
-        return default_fmu()
-    if game.suffix == ".fmu":
-        return game
-    return cached_fmu(game_file(game))
+        return default_game()
+    path = Path(game)
+    if suffix_of(path) in (".fmu", ".toml"):
+        return path
+    if path.suffix:
+        raise GameError(f"{path} ends in {path.suffix}, expected {expected}")
+    if str(path) not in shipped_games() and os.path.exists(path):  # noqa: PTH110 - never raises
+        raise GameError(f"{path} has no suffix, expected {expected}")
+    return shipped_game(str(path))
+
+
+def game_file(game: Path | str | None) -> Path:
+    """The game file meant, as source_of does. Raises GameError for an FMU as well."""
+    path = source_of(game, GAME_FILE)
+    if suffix_of(path) == ".fmu":
+        raise GameError(f"{path} is an FMU, expected {GAME_FILE}")
+    return path
+
+
+def fmu_of(game: Path | str | None, expected: str = SOURCE) -> Path:
+    """The FMU meant, as source_of does; a game is made into one and kept in the cache."""
+    path = source_of(game, expected)
+    return path if suffix_of(path) == ".fmu" else cached_fmu(path)
 
 
 def native_directory() -> Path:
@@ -181,7 +198,7 @@ def _describe(game: Path, output: Path, extra: Path) -> None:
             command, capture_output=True, encoding="utf-8", errors="replace", check=False
         )
     except OSError as error:
-        raise BuildError(f"cannot run {tool}: {error}") from error
+        raise BuildError(f"cannot run {tool}: {reason(error)}") from error
     if finished.returncode == 1:
         raise GameError(" ".join(finished.stderr.split()))
     if finished.returncode != 0 or not output.is_file():

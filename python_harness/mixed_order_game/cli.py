@@ -16,9 +16,10 @@ import typer.core
 
 from .analysis.command import register as register_analyse
 from .authoring.command import register as register_authoring
-from .build import fmu_of, game_file
+from .build import SOURCE_OR_RESULT, fmu_of, game_file
 from .compare_command import register as register_compare
 from .errors import MixedOrderGameError
+from .reading import suffix_of
 from .reporting.command import register as register_report
 from .shared_options import ToleranceOption
 from .sweep_command import register as register_sweep
@@ -115,9 +116,9 @@ def build(
 
     [bold]Example:[/bold] mog build my_game.toml --output my_game.fmu
     """
-    from .build import build_fmu, default_game
+    from .build import build_fmu
 
-    typer.echo(build_fmu(default_game() if game is None else game_file(game), output, arm_linux=arm_linux))
+    typer.echo(build_fmu(game_file(game), output, arm_linux=arm_linux))
 
 
 @app.command()
@@ -133,7 +134,7 @@ def info(
     from .model import read_model
     from .tables import info_data, print_info
 
-    model = read_model(fmu_of(game))
+    model = read_model(game)
     if as_json:
         typer.echo(json.dumps(info_data(model, variables=variables), indent=2))
     else:
@@ -195,9 +196,9 @@ def run(
     from .tables import print_result
 
     values = settings_of(settings or [])
-    if output is not None and output.suffix not in (".csv", ".parquet"):
+    if output is not None and suffix_of(output) not in (".csv", ".parquet"):
         raise typer.BadParameter("the file must end in .csv or .parquet", param_hint="--output")
-    with Simulator(fmu_of(game)) as simulator, _progress() as show:
+    with Simulator(game) as simulator, _progress() as show:
         model = simulator.model
         stop = model.stop_time if stop_time is None else stop_time
         span = stop - start_time
@@ -276,10 +277,10 @@ def plot(
     from .run import Simulator
 
     inches = PAGE_WIDTH if width is FigureWidth.PAGE else COLUMN_WIDTH
-    if source is not None and source.suffix in (".csv", ".parquet"):
+    if source is not None and suffix_of(source) in (".csv", ".parquet"):
         figures = result_figures(load(source), width=inches)
     else:
-        with Simulator(fmu_of(source)) as simulator:
+        with Simulator(fmu_of(source, SOURCE_OR_RESULT)) as simulator:
             robust, plain = (
                 simulator.run(
                     start_values={"robust": on, "perturbed": on}, stop_time=simulator.model.stop_time

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from .reading import suffix_of
 from .shared_options import SettingsOption, SettleTimeOption, StepOption, StopTimeOption, ToleranceOption
 
 if TYPE_CHECKING:
@@ -69,7 +70,7 @@ def compare(
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,  # noqa: FBT002
 ) -> None:
     """Set runs side by side."""
-    from .build import fmu_of
+    from .build import SOURCE_OR_RESULT, fmu_of
     from .compare import Comparison, compare_results, load_results
     from .compare import compare as run_variants
     from .model import read_model
@@ -78,8 +79,8 @@ def compare(
 
     fixed = settings_of(settings or [])
     wanted = dict(_variant(text) for text in variants or [])
-    games: list[Path | None] = [path for path in sources or [] if path.suffix not in RESULTS]
-    files = [path for path in sources or [] if path.suffix in RESULTS]
+    games: list[Path | None] = [path for path in sources or [] if suffix_of(path) not in RESULTS]
+    files = [path for path in sources or [] if suffix_of(path) in RESULTS]
     if not files and not games:
         games = [None]
     if not games and (fixed or wanted):
@@ -87,7 +88,7 @@ def compare(
 
     runs = list(compare_results(load_results(files), band=band, settle_time=settle_time).runs)
     for game in games:
-        fmu = fmu_of(game)
+        fmu = fmu_of(game, SOURCE_OR_RESULT)
         model = read_model(fmu)
         first = next((run.metrics for run in runs if run.metrics is not None), None)
         comparison = run_variants(

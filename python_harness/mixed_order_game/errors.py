@@ -8,6 +8,15 @@ class MixedOrderGameError(Exception):
     """Base of every error the package raises on purpose."""
 
 
+def reason(error: Exception) -> str:
+    """Why something failed, for the end of a sentence: of the system's errors neither number nor path."""
+    if isinstance(error, OSError) and error.strerror:
+        if isinstance(error, FileExistsError):  # of a folder to be made where a file stands
+            return "not a directory"
+        return error.strerror[0].lower() + error.strerror[1:]
+    return str(error)
+
+
 class GameError(MixedOrderGameError):
     """A game definition file that is missing or breaks the definition."""
 

@@ -5,7 +5,6 @@ Reads modelDescription.xml (through fmpy) and resources/game.toml from the archi
 
 import difflib
 import sys
-import tomllib
 import zipfile
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -16,9 +15,10 @@ from typing import Any
 import fmpy
 import numpy as np
 
-from .build import default_game
-from .errors import ModelError, VariableError
+from .build import default_game, fmu_of
+from .errors import ModelError, VariableError, reason
 from .names import parse_name
+from .reading import expect_file, read_text, text_of, toml_of
 
 MODEL_IDENTIFIER = "MixedOrderGame"
 Value = float | bool
@@ -180,7 +180,7 @@ class Model:
 
         Title, exposure and the two switches of the strategy may differ: they change no value of the game.
         """
-        paper = tomllib.loads(default_game().read_text(encoding="utf-8"))
+        paper = toml_of(read_text(default_game()))
         free = dict.fromkeys(("title", "expose", "strategy"))
         return {**paper, **free} == {**self.game, **free}
 
@@ -238,19 +238,22 @@ def check_value(variable: Variable, value: object, *, during_run: bool = False) 
     return float(value)
 
 
-def read_model(fmu: Path | str) -> Model:
-    """Read an FMU of this project. Raises ModelError if it is not one or cannot be read."""
-    path = Path(fmu)
-    if not path.is_file():
-        raise ModelError(f"there is no FMU {path}")
+def read_model(fmu: Path | str | None = None) -> Model:
+    """Read an FMU of this project, or that of a game file or of a game of the package by its name.
+
+    None stands for the paper's example. Raises ModelError for a file that is no FMU of this project or cannot
+    be read, GameError and BuildError as cached_fmu does.
+    """
+    path = fmu_of(fmu)
+    expect_file(path, "FMU", ModelError)
     try:
         with zipfile.ZipFile(path) as archive:
-            game = tomllib.loads(archive.read("resources/game.toml").decode("utf-8"))
+            game = toml_of(text_of(archive.read("resources/game.toml")))
         description = fmpy.read_model_description(str(path), validate=False)
     except KeyError as error:
         raise ModelError(f"{path} is not an FMU of this project: {error.args[0]}") from error
     except Exception as error:  # zipfile, lxml and fmpy raise what they please for a broken file
-        raise ModelError(f"{path} cannot be read as an FMU: {error}") from error
+        raise ModelError(f"{path} cannot be read as an FMU: {reason(error)}") from error
     interface = description.coSimulation
     if interface is None or interface.modelIdentifier != MODEL_IDENTIFIER:
         raise ModelError(f"{path} is not an FMU of this project: it has no co-simulation {MODEL_IDENTIFIER}")

@@ -19,6 +19,7 @@ from matplotlib.ticker import MaxNLocator
 
 from .errors import PlotError
 from .names import parse_name
+from .reading import suffix_of
 from .results import FloatArray, Result, write_whole
 
 COLUMN_WIDTH = 3.5
@@ -223,7 +224,8 @@ def save_figure(axes: Axes, path: Path | str) -> Path:
     Raises PlotError for another suffix, ResultError if the file cannot be written.
     """
     path = Path(path)
-    if path.suffix not in FORMATS:
+    suffix = suffix_of(path)
+    if suffix not in FORMATS:
         raise PlotError(f"{path} must end in {', '.join(FORMATS)}")
     dates = {".pdf": {"CreationDate": None}, ".svg": {"Date": None}, ".png": {}}
     figure = axes.get_figure(root=True)
@@ -234,10 +236,10 @@ def save_figure(axes: Axes, path: Path | str) -> Path:
         with paper_style():
             figure.savefig(
                 file,
-                format=path.suffix[1:],
+                format=suffix[1:],
                 bbox_inches="tight",
                 pad_inches=0.02,
-                metadata=dates[path.suffix],
+                metadata=dates[suffix],
             )
 
     write_whole(path, write)

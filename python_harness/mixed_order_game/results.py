@@ -15,8 +15,9 @@ from typing import IO, TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .errors import ResultError
+from .errors import ResultError, reason
 from .names import gather, indices_of, parse_name
+from .reading import ReadError, expect_file, number_of, read_table, suffix_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -224,9 +225,10 @@ class Result:
             ".csv": self._write_csv,
             ".parquet": self._write_parquet,
         }
-        if path.suffix not in writers:
+        suffix = suffix_of(path)
+        if suffix not in writers:
             raise ResultError(f"{path} must end in .csv or .parquet")
-        write_whole(path, writers[path.suffix])
+        write_whole(path, writers[suffix])
         return path
 
     def _write_csv(self, file: IO[bytes]) -> None:
@@ -272,22 +274,19 @@ def load(path: Path | str) -> Result:
     """Read a result written by Result.save. Raises ResultError if the file is missing or is not one."""
     path = Path(path)
     readers = {".csv": _read_csv, ".parquet": _read_parquet}
-    if path.suffix not in readers:
+    suffix = suffix_of(path)
+    if suffix not in readers:
         raise ResultError(f"{path} must end in .csv or .parquet")
-    if not path.is_file():
-        raise ResultError(f"there is no result file {path}")
+    expect_file(path, "result file", ResultError)
     try:
-        return readers[path.suffix](path)
-    except (ValueError, KeyError, TypeError, StopIteration, OSError) as error:
-        raise ResultError(f"{path} is not a result of this package: {error}") from error
+        return readers[suffix](path)
+    except (ReadError, ValueError, KeyError, TypeError, OSError) as error:
+        raise ResultError(f"{path} is not a result of this package: {reason(error)}") from error
 
 
 def _read_csv(path: Path) -> Result:
-    with path.open(encoding="utf-8", newline="") as file:
-        header = next(csv.reader(file))
-        rows = [[float(value) for value in row] for row in csv.reader(file)]
-    if header[0] != "time" or len(set(header)) != len(header):
-        raise ValueError("the first line must name time and then every variable once")
+    header, lines = read_table(path)
+    rows = [[number_of(cell, number) for cell in line] for number, line in enumerate(lines, start=2)]
     values = np.array(rows, dtype=np.float64).reshape(len(rows), len(header))
     columns = {name: np.ascontiguousarray(values[:, k]) for k, name in enumerate(header)}
     return Result(time=columns.pop("time"), columns=columns)
@@ -297,7 +296,10 @@ def _read_parquet(path: Path) -> Result:
     import pyarrow.parquet
 
     table = pyarrow.parquet.read_table(path)
-    metadata = json.loads((table.schema.metadata or {})[METADATA_KEY])
+    held = (table.schema.metadata or {}).get(METADATA_KEY)
+    if held is None:
+        raise ReadError("it does not tell of which game and run it is")
+    metadata = json.loads(held)
     metadata["messages"] = tuple(metadata["messages"])
     metadata.pop("metrics", None)  # Result computes them from its columns
     columns = {name: table.column(name).to_numpy() for name in table.column_names}
@@ -329,7 +331,7 @@ def write_whole(path: Path, write: Callable[[IO[bytes]], object]) -> None:
         temporary.chmod(0o644)
         temporary.replace(path)
     except OSError as error:
-        raise ResultError(f"cannot write {path}: {error}") from error
+        raise ResultError(f"cannot write {path}: {reason(error)}") from error
     finally:
         if temporary is not None:
             temporary.unlink(missing_ok=True)

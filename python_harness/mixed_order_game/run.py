@@ -41,7 +41,7 @@ LEFT_OUT = ("y", "W")
 
 
 def run(
-    fmu: Path | str,
+    fmu: Path | str | None = None,
     *,
     start_values: Mapping[str, Value] | None = None,
     stop_time: float = 20.0,
@@ -53,7 +53,7 @@ def run(
     changes: Changes | None = None,
     progress: Progress | None = None,
 ) -> Result:
-    """Run an FMU once. For several runs of one FMU use Simulator, whose run() this is."""
+    """Run an FMU, or a game, once. For several runs of one use Simulator, whose run() this is."""
     with Simulator(fmu) as simulator:
         return simulator.run(
             start_values=start_values,
@@ -71,10 +71,12 @@ def run(
 class Simulator:
     """One FMU, unpacked and loaded once, run as often as wanted. Use it in a with statement.
 
-    Raises ModelError if the FMU cannot be read, SimulationError if it cannot be loaded on this machine.
+    fmu: a file (.fmu), or a game, of which it is made on first use: a game file (.toml), a game of the
+    package by its name, or None for the paper's example.
+    Raises what read_model raises, SimulationError if the FMU cannot be loaded on this machine.
     """
 
-    def __init__(self, fmu: Path | str) -> None:
+    def __init__(self, fmu: Path | str | None = None) -> None:
         self.model: Model = read_model(fmu)
         self._messages: list[tuple[int, str]] = []
         self._folder = Path(tempfile.mkdtemp(prefix="mixed-order-game-"))

@@ -5,7 +5,6 @@ file. Names in CSV headers contain commas and stand in double quotes; the csv mo
 """
 
 import csv
-import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -19,6 +18,7 @@ from .errors import MixedOrderGameError
 from .graphs import CommunicationGraph, edge_values, graphs_of_text
 from .model import Model, Value, check_value
 from .names import parse_name
+from .reading import ReadError, number_of, read_table, read_text, suffix_of, toml_of
 from .results import write_whole
 
 FloatArray = NDArray[np.float64]
@@ -98,18 +98,19 @@ def read_graph_schedule(path: Path | str, model: Model) -> GraphSchedule:
     """
     path = Path(path)
     readers = {".toml": _read_toml, ".csv": _read_edges}
-    if path.suffix not in readers:
+    suffix = suffix_of(path)
+    if suffix not in readers:
         raise ScheduleError(f"{path} must end in .toml or .csv")
     try:
-        return readers[path.suffix](path, model)
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError, csv.Error) as error:
+        return readers[suffix](path, model)
+    except ReadError as error:
         raise ScheduleError(f"{path} cannot be read: {error}") from error
     except MixedOrderGameError as error:
         raise ScheduleError(f"{path}: {error}") from error
 
 
 def _read_toml(path: Path, model: Model) -> GraphSchedule:
-    data = tomllib.loads(path.read_text(encoding="utf-8"))
+    data = toml_of(read_text(path))
     _known(data, {"graph", "period"}, "the schedule")
     tables = data.get("graph")
     if not isinstance(tables, list) or not tables or not all(isinstance(each, dict) for each in tables):
@@ -206,11 +207,11 @@ def read_disturbance(path: Path | str, model: Model, *, linear: bool = False) ->
     Inputs without a column are 0. Raises ScheduleError naming the file.
     """
     path = Path(path)
-    if path.suffix != ".csv":
+    if suffix_of(path) != ".csv":
         raise ScheduleError(f"{path} must end in .csv")
     try:
         return _disturbance(path, model, linear=linear)
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
+    except ReadError as error:
         raise ScheduleError(f"{path} cannot be read: {error}") from error
     except ScheduleError as error:
         raise ScheduleError(f"{path}: {error}") from error
@@ -256,22 +257,11 @@ def _check_shapes(time: FloatArray, values: FloatArray) -> None:
 
 def _read_table(path: Path) -> tuple[list[str], list[tuple[float, list[float]]]]:
     """Names of the columns but time, and rows (time, cells); NaN for an empty cell."""
-    with path.open(encoding="utf-8-sig", newline="") as file:
-        lines = [line for line in csv.reader(file, strict=True) if line]
-    header, body = ([name.strip() for name in lines[0]], lines[1:]) if lines else ([], [])
-    cut = next((name for name in header if name.count("[") != name.count("]")), None)
-    if cut is not None:
-        raise ScheduleError(f"the name {cut} is cut at its comma: names stand in double quotes")
-    if header[:1] != [TIME] or len(set(header)) != len(header):
-        raise ScheduleError(
-            "the first line must name time and then every variable once, names in double quotes"
-        )
+    header, body = read_table(path)
     if not body:
         raise ScheduleError("there are no rows below the header")
     rows: list[tuple[float, list[float]]] = []
     for number, line in enumerate(body, start=2):
-        if len(line) != len(header):
-            raise ScheduleError(f"row {number} has {len(line)} cells, the header has {len(header)}")
         cells = [float("nan") if not cell.strip() else _cell(cell, number) for cell in line]
         if np.isnan(cells[0]) or (rows and cells[0] <= rows[-1][0]):
             raise ScheduleError(f"the times do not go up at row {number}")
@@ -295,10 +285,7 @@ def _write_table(path: Path, names: Sequence[str], rows: Iterable[Sequence[objec
 
 
 def _cell(text: str, row: int) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        raise ScheduleError(f"row {row}: {text!r} is not a number") from None
+    value = number_of(text, row)
     if not np.isfinite(value):
         raise ScheduleError(f"row {row}: {text!r} is not finite")
     return value

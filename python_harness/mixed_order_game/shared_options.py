@@ -8,7 +8,8 @@ import typer
 GameArgument = Annotated[
     Path | None,
     typer.Argument(
-        help="An FMU (.fmu) or a game file (.toml); the paper's example when left out.",
+        help="An FMU (.fmu), a game file (.toml) or a game of the package by name; "
+        "the paper's example when left out.",
         show_default=False,
     ),
 ]

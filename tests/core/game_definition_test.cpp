@@ -504,6 +504,15 @@ TEST(HostileGameDefinition, DotsElsewhereAreNoKeys) {
   EXPECT_EQ(refusal(edited("title = \"three players\"", "title = \"\"\"\\\n" + many + "\\\n\"\"\"")), "(accepted)");
 }
 
+TEST(GameDefinition, MayBeginWithAByteOrderMark) {
+  const std::string mark = "\xEF\xBB\xBF";
+  EXPECT_EQ(refusal(mark + std::string(three_players)), "(accepted)");
+  EXPECT_EQ(refusal(mark + "title = 1\n"), refusal("title = 1\n"));
+  for (const std::string other : {"\xFF\xFE", "\xFE\xFF"}) {
+    EXPECT_EQ(refusal(other + "t"), "the game definition is UTF-16 text, expected UTF-8");
+  }
+}
+
 TEST(HostileGameDefinition, OfBytesThatAreNoTextIsRefused) {
   using namespace std::string_view_literals;
   EXPECT_NE(refusal("title = \"\xff\xfe\""sv).find("line 1, column"), std::string::npos);

@@ -111,7 +111,7 @@ def test_bad_games_are_refused(old: str, new: str, tmp_path: Path) -> None:
     bad.write_text(text.replace(old, new), encoding="utf-8")
     with pytest.raises(GameError, match=r"bad\.toml"):
         read_game(bad)
-    with pytest.raises(GameError, match="neither"):
+    with pytest.raises(GameError, match="expected an FMU"):
         read_game(tmp_path / "bad.txt")
 
 

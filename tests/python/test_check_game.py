@@ -129,7 +129,7 @@ def test_says_what_building_says(tmp_path: Path) -> None:
     [
         (b'title = "a"\nfoo = = 3\n', 2, "is not TOML"),
         (b'title = "a"\n\n[gains\nk1 = 1\n', 3, "is not TOML"),
-        (b"\xff\xfe", 1, "is not TOML"),
+        (b"\xff\xfe", 1, "is UTF-16 text"),
         (b"", 1, "is missing"),
         (b"a.b.c.d.e.f.g.h.i.j.k.l.m.n.o.p.q.r = 1\n", 1, "more than 16 dots"),
         (b'title = "a"\ntitle = "b"\n', 2, "is not TOML"),
@@ -219,6 +219,10 @@ def test_command(tmp_path: Path) -> None:
         1,
         f"mog: there is no game file {tmp_path / 'none.toml'}\n",
     )
+    several = mog("check", tmp_path / "none.toml", default_game(), tmp_path, "five_vehicles")
+    assert several.exit_code == 1
+    assert several.stdout == f"{default_game()} is valid\nfive_vehicles is valid\n"
+    assert several.stderr.count("mog: ") == 2
     assert mog("check").exit_code == 2
     assert mog("check", "--nonsense").exit_code == 2
     assert "mog check" in mog("check", "--help").stdout.split("Example")[1]

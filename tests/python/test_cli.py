@@ -99,7 +99,9 @@ def test_errors_of_run(arguments: list[str], told: str, fmu: Path) -> None:
 def test_files_that_are_no_games(command: str, tmp_path: Path) -> None:
     (tmp_path / "text.fmu").write_text("text")
     (tmp_path / "bad.toml").write_text("title = 1")
-    assert "neither an FMU" in sentence(mog(command, tmp_path / "game.txt"))
+    told = sentence(mog(command, tmp_path / "game.txt"))
+    assert f"mog: {tmp_path / 'game.txt'} ends in .txt, expected an FMU (.fmu)" in told
+    assert ("result (.parquet, .csv)" in told) == (command == "plot")
     assert "there is no game nothing; those" in sentence(mog(command, "nothing"))
     assert "there is no FMU" in sentence(mog(command, tmp_path / "none.fmu"))
     assert "cannot be read" in sentence(mog(command, tmp_path / "text.fmu"))
@@ -116,6 +118,9 @@ def test_build(fmu: Path, tmp_path: Path) -> None:
     bad.write_text(default_game().read_text().replace("k1 = 10.0", "k1 = 0.0"))
     assert "k1" in sentence(mog("build", bad, "--output", tmp_path / "bad.fmu"))
     assert not (tmp_path / "bad.fmu").exists()
+    for command, options in (("build", ["--output", tmp_path / "bad.fmu"]), ("check", [])):
+        told = sentence(mog(command, fmu, *options))
+        assert told == f"mog: {fmu} is an FMU, expected a game file (.toml)\n"
 
 
 def test_info(fmu: Path) -> None:

@@ -397,7 +397,7 @@ def test_command_fails_with_the_claims(tmp_path: Path) -> None:
         (["--set", "k5=1"], 1, "there is no variable k5"),
         (["nothing.fmu"], 1, "there is no FMU"),
         (["nothing.parquet"], 1, "there is no result file"),
-        (["nothing.txt"], 1, "neither an FMU"),
+        (["nothing.txt"], 1, "expected an FMU"),
         (["no_such_game"], 1, "no_such_game"),
     ],
 )

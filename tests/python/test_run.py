@@ -5,7 +5,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mixed_order_game import SimulationError, Simulator, VariableError, run
+from mixed_order_game import (
+    GameError,
+    SimulationError,
+    Simulator,
+    VariableError,
+    default_game,
+    read_model,
+    run,
+)
+from mixed_order_game.build import shipped_game
 from mixed_order_game.names import parse_name
 from tests.conftest import FmuOf
 
@@ -216,6 +225,23 @@ def test_two_simulators_at_once(fmu: Path, fmu_of: FmuOf) -> None:
         two.run(stop_time=0.2)
         first, third = one.run(stop_time=0.2), three.run(stop_time=0.2)
     np.testing.assert_array_equal(first.x, third.x)
+
+
+def test_games_in_place_of_an_fmu(fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As the command takes them: a game file, a game of the package by its name, the paper's for nothing."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    expected = run(fmu, stop_time=0.1)
+    for game in ((), ("five_vehicles",), (str(default_game()),), (default_game(),)):
+        np.testing.assert_array_equal(run(*game, stop_time=0.1).x, expected.x)
+    assert read_model("opinion_formation").players == read_model(shipped_game("opinion_formation")).players
+    with pytest.raises(
+        GameError, match="there is no game six_vehicles; those that come with the package are"
+    ):
+        run("six_vehicles")
+    with pytest.raises(GameError, match=r"game\.txt ends in \.txt, expected an FMU \(\.fmu\) or a game file"):
+        Simulator("game.txt")
+    with pytest.raises(GameError, match="has no suffix, expected an FMU"):
+        run(tmp_path)
 
 
 def test_closed_simulator(fmu: Path) -> None:

@@ -113,7 +113,7 @@ def test_wrong_usage_of_sweep(arguments: list[str], told: str, fmu: Path, tmp_pa
     ("arguments", "told"),
     [
         (["none.fmu"], "there is no FMU none.fmu"),
-        (["none.txt"], "neither an FMU"),
+        (["none.txt"], "expected an FMU"),
         (["--grid", "k9=1,2"], "there is no variable k9"),
         (["--range", "k1=1:2", "--samples", "3", "--design", "sobol"], "power of two"),
         (["--step", "0"], "step = 0 is not positive"),

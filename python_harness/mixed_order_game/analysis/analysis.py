@@ -6,16 +6,17 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
-from ..build import build_fmu, cached_fmu
+from ..build import build_fmu, cached_fmu, source_of
 from ..errors import GameError
 from ..model import Value
+from ..reading import suffix_of
 from .analyst import Analyst, Progress
 from .findings import Analysis
 from .game import AnalysedGame, game_from_tables, read_game, toml_text, without_square
 
 
 def analyse(
-    game: Path | str,
+    game: Path | str | None,
     *,
     changes: Mapping[str, Value] | None = None,
     simulation: bool = True,
@@ -23,7 +24,7 @@ def analyse(
     radius: float = 0.1,
     progress: Progress | None = None,
 ) -> Analysis:
-    """Analyse a game file (.toml) or an FMU (.fmu).
+    """Analyse an FMU (.fmu), a game file (.toml), a game of the package by its name, the paper's for None.
 
     changes: start values in place of the FMU's own. simulation: run the FMU with the game's gains and with
     the designed ones. square = False: the same game with the square terms of g removed. radius: lim sup of
@@ -35,8 +36,9 @@ def analyse(
     """
     if not (math.isfinite(radius) and radius > 0.0):
         raise GameError(f"radius = {radius:g} is not positive")
-    with _opened(Path(game), changes, simulation=simulation, square=square) as (analysed, fmu):
-        return Analyst(analysed, fmu, changes or {}, radius, progress).analysis(Path(game))
+    source = source_of(game)
+    with _opened(source, changes, simulation=simulation, square=square) as (analysed, fmu):
+        return Analyst(analysed, fmu, changes or {}, radius, progress).analysis(source)
 
 
 @contextmanager
@@ -46,7 +48,7 @@ def _opened(
     """The game and, where one is needed, its FMU."""
     needs_fmu = simulation or bool(changes)
     if square:
-        if path.suffix == ".fmu" or not needs_fmu:
+        if suffix_of(path) == ".fmu" or not needs_fmu:
             yield read_game(path, changes), path if simulation else None
             return
         read_game(path)

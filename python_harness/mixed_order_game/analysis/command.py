@@ -43,15 +43,10 @@ def analyse(
 
     mog analyse --no-square --radius 0.01 --set k3=100
     """
-    from ..build import default_game, shipped_game
     from ..sweeping.options import settings_of
     from .analysis import analyse as run_analysis
     from .rendering import print_analysis
 
-    if game is None:
-        game = default_game()
-    elif not game.suffix and not game.exists():
-        game = shipped_game(str(game))
     with _progress() as show:
         found = run_analysis(
             game,

@@ -1,7 +1,6 @@
 """One game for the analysis, from a game file or an FMU: parameters, network and the file's tables."""
 
 import math
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -10,9 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..build import source_of
 from ..errors import GameError
 from ..model import Value, read_model
 from ..parameters import GameParameters, game_parameters
+from ..reading import ReadError, expect_file, read_text, suffix_of, toml_of
 
 FloatArray = NDArray[np.float64]
 Table = Mapping[str, Any]
@@ -58,13 +59,15 @@ class AnalysedGame:
 
 
 def read_game(path: Path | str, changes: Mapping[str, Value] | None = None) -> AnalysedGame:
-    """Read a game file (.toml) or an FMU (.fmu); changes replace start values of an FMU.
+    """Read a game file (.toml), a game of the package by its name or an FMU (.fmu).
+
+    changes replace start values of an FMU.
 
     Raises GameError for a file that is missing or breaks the definition of a game, ModelError for a broken
     FMU, VariableError for a change that the FMU would not take.
     """
-    path = Path(path)
-    if path.suffix == ".fmu":
+    path = source_of(path)
+    if suffix_of(path) == ".fmu":
         model = read_model(path)
         values = model.start_values(changes)
         parameters = game_parameters(model, changes)
@@ -77,13 +80,12 @@ def read_game(path: Path | str, changes: Mapping[str, Value] | None = None) -> A
         return AnalysedGame(
             model.title, parameters, beta, _centers(network, size), float(network["width"]), model.game, path
         )
-    if path.suffix != ".toml":
-        raise GameError(f"{path} is neither an FMU (.fmu) nor a game file (.toml)")
     if changes:
         raise GameError("changes need an FMU; edit the game file instead")
+    expect_file(path, "game file", GameError)
     try:
-        tables = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        tables = toml_of(read_text(path))
+    except ReadError as error:
         raise GameError(f"{path} cannot be read: {error}") from error
     return game_from_tables(tables, path)
 

@@ -8,14 +8,14 @@ import difflib
 import math
 import re
 import subprocess
-import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ..build import host_tool
-from ..errors import BuildError, GameError
+from ..build import game_file, host_tool
+from ..errors import BuildError, GameError, reason
+from ..reading import ReadError, expect_file, read_text, toml_of
 from .positions import Path as Entry
 from .positions import Positions
 from .schema import game_schema
@@ -44,13 +44,12 @@ class _Found:
 
 
 def check_game(game: Path | str) -> tuple[Problem, ...]:
-    """Every problem found in a game file, by line; empty if the game is valid.
+    """Every problem found in a game file, or in a game of the package by its name; empty if it is valid.
 
     Raises GameError if there is no such file, BuildError if the installation lacks the host tool.
     """
-    game = Path(game)
-    if not game.is_file():
-        raise GameError(f"there is no game file {game}")
+    game = game_file(game)
+    expect_file(game, "game file", GameError)
     sentence = _judge(game)
     if sentence is None:
         return ()
@@ -58,9 +57,9 @@ def check_game(game: Path | str) -> tuple[Problem, ...]:
     if not_toml is not None:
         return (Problem(int(not_toml[1]), f"the file {not_toml[2]}"),)
     try:
-        text = game.read_text(encoding="utf-8")
-        document = tomllib.loads(text)
-    except (OSError, ValueError):  # unreadable, not UTF-8, or a fine point of TOML on which parsers differ
+        text = read_text(game)
+        document = toml_of(text)
+    except ReadError:  # not UTF-8, or a fine point of TOML on which parsers differ
         return (Problem(1, sentence),)
     positions = Positions(text)
     first = _Found(_entry_of(sentence, document), sentence)
@@ -81,7 +80,7 @@ def _judge(game: Path) -> str | None:
             check=False,
         )
     except OSError as error:
-        raise BuildError(f"cannot run {tool}: {error}") from error
+        raise BuildError(f"cannot run {tool}: {reason(error)}") from error
     if finished.returncode == 0:
         return None
     if finished.returncode != 1:

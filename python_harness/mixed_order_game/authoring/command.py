@@ -46,11 +46,12 @@ def new(
     mog new large.toml --players 60 --graph small-world:6:0.1 --seed 3
     """
     from ..errors import GameError
+    from ..reading import suffix_of
     from ..results import write_whole
     from .check_game import check_game
     from .new_game import Recipe, new_game
 
-    if output.suffix != ".toml":
+    if suffix_of(output) != ".toml":
         raise typer.BadParameter("the file must end in .toml", param_hint="OUTPUT")
     if output.exists() and not force:
         raise GameError(f"{output} exists: name another file or add --force")
@@ -70,11 +71,17 @@ def check(
 
     [bold]Example:[/bold] mog check my_game.toml
     """
+    from ..errors import GameError
     from .check_game import check_game
 
     broken = False
     for game in games:
-        problems = check_game(game)
+        try:
+            problems = check_game(game)
+        except GameError as error:
+            typer.echo(f"mog: {error}", err=True)
+            broken = True
+            continue
         for problem in problems:
             typer.echo(f"{game}:{problem.line}: {problem.sentence}", err=True)
         if not problems:

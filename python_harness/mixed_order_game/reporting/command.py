@@ -48,15 +48,15 @@ def report(
     mog run --output run.parquet
     mog report run.parquet
     """
-    from ..build import default_game
+    from ..reading import suffix_of
     from ..sweeping.options import settings_of
     from .page import report as write_report
 
-    if output.suffix != ".html":
+    if suffix_of(output) != ".html":
         raise typer.BadParameter("the file must end in .html", param_hint="--output")
     changes = settings_of(settings or [])
     done = write_report(
-        default_game() if source is None else source,
+        source,
         output,
         changes=changes,
         claims=claims,

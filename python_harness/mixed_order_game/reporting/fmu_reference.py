@@ -8,7 +8,6 @@ import re
 import sys
 from collections.abc import Sequence
 
-from ..build import default_fmu
 from ..errors import MixedOrderGameError
 from ..model import Model, Variable, read_model
 from ..names import parse_name
@@ -119,7 +118,7 @@ def main(arguments: Sequence[str]) -> int:
         sys.stderr.write("usage: python -m mixed_order_game.reporting.fmu_reference [FMU]\n")
         return 2
     try:
-        sys.stdout.write(fmu_reference(read_model(arguments[0] if arguments else default_fmu())))
+        sys.stdout.write(fmu_reference(read_model(arguments[0] if arguments else None)))
     except MixedOrderGameError as error:
         sys.stderr.write(f"fmu_reference: {error}\n")
         return 1

@@ -16,6 +16,7 @@ from ..model import Value, provenance
 from ..names import parse_name
 from ..parameters import game_parameters
 from ..plot import edges_of
+from ..reading import suffix_of
 from ..results import Result, load, write_whole
 from ..version import package_version
 from .evidence import Evidence, energy_so_far, evidence_of_game, evidence_of_result
@@ -40,7 +41,7 @@ class Report:
 
 
 def report(
-    source: Path | str,
+    source: Path | str | None,
     output: Path | str,
     *,
     changes: Mapping[str, Value] | None = None,
@@ -50,25 +51,22 @@ def report(
 ) -> Report:
     """Write the page of an FMU, a game file, a game of the package by name, or a stored result.
 
+    None stands for the paper's example.
+
     changes, claims, stop_time (s) and progress: as in evidence_of_game; a stored result takes none of them.
     Raises what running, judging and loading raise; ResultError if the page cannot be written.
     """
-    from ..build import cached_fmu, shipped_game
+    from ..build import SOURCE_OR_RESULT, fmu_of
 
-    source, output = Path(source), Path(output)
-    if source.suffix in (".parquet", ".csv"):
+    output = Path(output)
+    if source is not None and suffix_of(source) in (".parquet", ".csv"):
         if changes or stop_time is not None:
             raise GameError(f"{source} is a stored run: it takes neither parameters nor a stop time")
         evidence = evidence_of_result(load(source))
-    elif source.suffix in (".fmu", ".toml", ""):
-        game = source if source.suffix else shipped_game(str(source))
-        fmu = game if game.suffix == ".fmu" else cached_fmu(game)
+    else:
+        fmu = fmu_of(source, SOURCE_OR_RESULT)
         evidence = evidence_of_game(
             fmu, changes=changes, claims=claims, stop_time=stop_time, progress=progress
-        )
-    else:
-        raise GameError(
-            f"{source} is neither an FMU (.fmu), a game file (.toml) nor a result (.parquet, .csv)"
         )
     page = render_page(evidence)
     write_whole(output, lambda file: file.write(page.encode()))

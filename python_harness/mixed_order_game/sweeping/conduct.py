@@ -45,7 +45,7 @@ def sweep(
         if progress is not None:
             progress(done, definition.rows)
         if cases:
-            pool = open_pool(Path(definition.fmu), jobs=jobs, scheduler=scheduler, work=work)
+            pool = open_pool(definition.model.path, jobs=jobs, scheduler=scheduler, work=work)
             try:
                 for outcomes in run_cases(pool, definition.settings, cases):
                     store.append(outcomes)
@@ -68,7 +68,7 @@ def connected_graphs_example(fmu: Path | str) -> Sweep:
     switched: dict[str, Value] = {"robust": True, "perturbed": True}
     allowed = bounds(model, game_parameters(model, switched))
     return Sweep(
-        fmu=Path(fmu),
+        fmu=model.path,
         fixed=switched,
         graphs=tuple(all_connected(model.players)),
         settings=Settings(stop_time=model.stop_time, step=model.step, settle_time=allowed.settle_time),

@@ -34,7 +34,7 @@ class Sweep:
     not take, DesignError for a design that makes no sense, ModelError for an FMU that cannot be read.
     """
 
-    fmu: Path
+    fmu: Path | str  # or a game, as Simulator takes
     fixed: Mapping[str, Value] = field(default_factory=dict)  # start values of every row
     grid: Mapping[str, tuple[Value, ...]] = field(default_factory=dict)  # all combinations
     ranges: Mapping[str, Range] = field(default_factory=dict)  # `samples` points drawn from them
@@ -201,7 +201,7 @@ class Sweep:
         return {
             "package_version": package_version(),
             "guid": self.model.guid,
-            "fmu": hashlib.sha256(Path(self.fmu).read_bytes()).hexdigest(),
+            "fmu": hashlib.sha256(self.model.path.read_bytes()).hexdigest(),
             "title": self.model.title,
             "seed": self.seed,
             "changed": self._expanded(self.fixed),
