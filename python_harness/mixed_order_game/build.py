@@ -8,15 +8,17 @@ licenses/ and model.png, for this machine's platform or for all of them; in its 
 import hashlib
 import os
 import platform
+import shutil
 import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
-from .errors import BuildError, GameError, reason
+from .errors import BuildError, GameError, ResultError, reason
 from .packaging import PackagingError, write_fmu
 from .reading import expect_file, suffix_of
+from .writing import FMU, check_output, write_file
 
 DEFAULT_GAME = "five_vehicles"
 """The paper's example."""
@@ -29,24 +31,32 @@ TOOL = "mixed-order-game-description"
 ARM_LINUX = "aarch64-linux"
 
 
-def build_fmu(game: Path | str, output: Path | str, *, arm_linux: bool | None = None) -> Path:
+def build_fmu(
+    game: Path | str, output: Path | str, *, arm_linux: bool | None = None, force: bool = False
+) -> Path:
     """Make the FMU of a game file (TOML), or of a game of the package by its name; return `output`.
 
     It holds the libraries of all platforms that the package carries. With `arm_linux`, the default on such a
     machine, it is for 64-bit Arm Linux alone: its library lies in linux64 too, where most importers look.
-    Equal inputs give equal bytes. Raises GameError if the file is missing or breaks the definition of a game,
-    BuildError if the installation lacks the compiled parts or the archive cannot be written.
+    Equal inputs give equal bytes. Replaces an FMU of a game, with `force` any file but the game. Raises
+    GameError if the file is missing or breaks the definition of a game, BuildError if the installation lacks
+    the compiled parts or the archive cannot be written or does not replace the file.
     """
     game, output = game_file(game), Path(output)
     expect_file(game, "game file", GameError)
+    try:
+        check_output(output, FMU, inputs=[game], force=force)
+    except ResultError as error:
+        raise BuildError(str(error)) from error
     native = native_directory()
     with tempfile.TemporaryDirectory(prefix="mixed-order-game-") as folder:
-        description, extra = Path(folder) / "modelDescription.xml", Path(folder) / "extra"
+        archive, description = Path(folder) / "game.fmu", Path(folder) / "modelDescription.xml"
+        extra = Path(folder) / "extra"
         extra.mkdir()
         _describe(game, description, extra)
         try:
-            return write_fmu(
-                output,
+            write_fmu(
+                archive,
                 model_description=description,
                 game=game,
                 binaries=_binaries(
@@ -57,8 +67,14 @@ def build_fmu(game: Path | str, output: Path | str, *, arm_linux: bool | None = 
                 icon=native / "model.png",
                 extra=extra,
             )
+            with archive.open("rb") as made:
+                return write_file(
+                    output, FMU, lambda file: shutil.copyfileobj(made, file), inputs=[game], force=force
+                )
         except (PackagingError, OSError) as error:
             raise BuildError(f"cannot write {output}: {reason(error)}") from error
+        except ResultError as error:
+            raise BuildError(str(error)) from error
 
 
 def default_fmu() -> Path:
@@ -86,7 +102,7 @@ def cached_fmu(game: Path | str) -> Path:
         fingerprint.update(path.relative_to(native).as_posix().encode() + b"\0" + path.read_bytes())
     cache = platformdirs.user_cache_path("mixed-order-game")
     output = cache / fingerprint.hexdigest()[:16] / "MixedOrderGame.fmu"
-    return output if output.is_file() else build_fmu(game, output)
+    return output if output.is_file() else build_fmu(game, output, force=True)
 
 
 def default_game() -> Path:

@@ -5,7 +5,7 @@ Exit codes: 0 fine; 1 a check failed, or an error told in one sentence on stderr
 
 import json
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from enum import StrEnum
 from pathlib import Path
@@ -19,9 +19,8 @@ from .authoring.command import register as register_authoring
 from .build import SOURCE_OR_RESULT, fmu_of, game_file
 from .compare_command import register as register_compare
 from .errors import MixedOrderGameError
-from .reading import suffix_of
 from .reporting.command import register as register_report
-from .shared_options import ToleranceOption
+from .shared_options import ForceOption, ToleranceOption, output_option
 from .sweep_command import register as register_sweep
 from .tune_command import register as register_tune
 from .version import package_version
@@ -111,14 +110,18 @@ def build(
             show_default=False,
         ),
     ] = None,
+    force: ForceOption = False,
 ) -> None:
     """Make an FMU from a game file. No compiler is needed.
 
     [bold]Example:[/bold] mog build my_game.toml --output my_game.fmu
     """
     from .build import build_fmu
+    from .writing import FMU
 
-    typer.echo(build_fmu(game_file(game), output, arm_linux=arm_linux))
+    source = game_file(game)
+    output_option(output, FMU, inputs=[source], force=force)
+    typer.echo(build_fmu(source, output, arm_linux=arm_linux, force=force))
 
 
 @app.command()
@@ -178,6 +181,7 @@ def run(
     linear_disturbance: Annotated[
         bool, typer.Option("--linear-disturbance", help="Straight between its rows, not held.")
     ] = False,
+    force: ForceOption = False,
 ) -> None:
     r"""Run a game through fmpy and write or summarize the result.
 
@@ -194,10 +198,11 @@ def run(
     from .schedule import read_disturbance, read_graph_schedule
     from .sweeping.options import settings_of
     from .tables import print_result
+    from .writing import RESULT
 
     values = settings_of(settings or [])
-    if output is not None and suffix_of(output) not in (".csv", ".parquet"):
-        raise typer.BadParameter("the file must end in .csv or .parquet", param_hint="--output")
+    if output is not None:
+        output_option(output, RESULT, inputs=[game, graph_schedule, disturbance], force=force)
     with Simulator(game) as simulator, _progress() as show:
         model = simulator.model
         stop = model.stop_time if stop_time is None else stop_time
@@ -219,7 +224,7 @@ def run(
             progress=lambda time: show("simulating", (time - start_time) / span),
         )
     if output is not None:
-        typer.echo(result.save(output))
+        typer.echo(result.save(output, force=force))
     else:
         print_result(result)
 
@@ -263,6 +268,7 @@ def plot(
     output: Annotated[Path, typer.Option("--output", "-o", help="Folder for the figures.")] = Path("figures"),
     file_format: Annotated[FigureFormat, typer.Option("--format", help="File format.")] = FigureFormat.PDF,
     width: Annotated[FigureWidth, typer.Option(help="Width in a two-column paper.")] = FigureWidth.COLUMN,
+    force: ForceOption = False,
 ) -> None:
     """Draw the figures of a result, or of a game the paper's four, the error and the paths in the plane.
 
@@ -272,15 +278,32 @@ def plot(
 
     mog plot result.parquet --width page
     """
-    from .plot import COLUMN_WIDTH, PAGE_WIDTH, paper_figures, result_figures, save_figure
+    from .plot import (
+        COLUMN_WIDTH,
+        PAGE_WIDTH,
+        paper_figure_names,
+        paper_figures,
+        result_figures,
+        save_figure,
+    )
     from .results import load
     from .run import Simulator
+    from .writing import FIGURE, RESULT
 
     inches = PAGE_WIDTH if width is FigureWidth.PAGE else COLUMN_WIDTH
-    if source is not None and suffix_of(source) in (".csv", ".parquet"):
+
+    def judged(names: Iterable[str]) -> dict[str, Path]:
+        paths = {name: output / f"{name}.{file_format.value}" for name in names}
+        for path in paths.values():
+            output_option(path, FIGURE, inputs=[source], force=force)
+        return paths
+
+    if source is not None and RESULT.takes(source):
         figures = result_figures(load(source), width=inches)
+        paths = judged(figures)
     else:
         with Simulator(fmu_of(source, SOURCE_OR_RESULT)) as simulator:
+            paths = judged(paper_figure_names(simulator.model))
             robust, plain = (
                 simulator.run(
                     start_values={"robust": on, "perturbed": on}, stop_time=simulator.model.stop_time
@@ -289,7 +312,7 @@ def plot(
             )
         figures = paper_figures(robust, plain, width=inches)
     for name, axes in figures.items():
-        typer.echo(save_figure(axes, output / f"{name}.{file_format.value}"))
+        typer.echo(save_figure(axes, paths[name], force=force))
 
 
 @app.command()
@@ -302,6 +325,7 @@ def demo(
         typer.Option(help="The FMU or game to use; the paper's example when left out.", show_default=False),
     ] = None,
     file_format: Annotated[FigureFormat, typer.Option("--format", help="File format.")] = FigureFormat.PNG,
+    force: ForceOption = False,
 ) -> None:
     """Simulate the paper's example, judge each claim, print the verdict and write results and figures.
 
@@ -311,7 +335,7 @@ def demo(
 
     path = fmu_of(fmu)
     with _progress() as show:
-        done = demonstrate(path, output, suffix=f".{file_format.value}", progress=show)
+        done = demonstrate(path, output, suffix=f".{file_format.value}", force=force, progress=show)
     for file in done.files:
         typer.echo(file)
     _report(done.validation, as_json=False)

@@ -4,7 +4,7 @@ Without the network beta = 0: the weights start at 0 and stay there. Without phi
 the strategy of Theorem 2, robust = false.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -115,17 +115,18 @@ def compare(
     band = chosen.band
     runs: list[Compared] = []
     with Sampler(fmu) as sampler:
-        for label, values in wanted.items():
-            start = {**shared, **values}
-            changed = changed_values(sampler.model, sampler.model.start_values(start))
+        model = sampler.model
+        starts = {label: {**shared, **values} for label, values in wanted.items()}
+        changes = {label: changed_values(model, model.start_values(start)) for label, start in starts.items()}
+        for label, start in starts.items():
             try:
                 result = sampler.record(start, chosen)
             except SimulationError as error:
-                runs.append(Compared(label, changed, None, None, str(error)))
+                runs.append(Compared(label, changes[label], None, None, str(error)))
                 continue
             found = metrics(result, band=band, settle_time=chosen.settle_time)
             band = found.band if band is None else band
-            runs.append(Compared(label, changed, result, found))
+            runs.append(Compared(label, changes[label], result, found))
     return Comparison(tuple(runs))
 
 
@@ -141,10 +142,18 @@ def compare_results(
     return Comparison(tuple(runs))
 
 
-def load_results(paths: list[Path]) -> dict[str, Result]:
-    """Result files by name; by path where two have the same name. Raises ResultError."""
+def load_results(paths: Sequence[Path], needed: Sequence[str] = ()) -> dict[str, Result]:
+    """Result files by name; by path where two have the same name.
+
+    Raises ResultError for what is no result or lacks one of the signals that are needed.
+    """
     names = [path.stem for path in paths]
     labels = [path.stem if names.count(path.stem) == 1 else str(path) for path in paths]
     if len(set(labels)) != len(labels):
         raise ResultError("a result is named twice")
-    return {label: load(path) for label, path in zip(labels, paths, strict=True)}
+    results = {label: load(path) for label, path in zip(labels, paths, strict=True)}
+    for label, result in results.items():
+        lacking = [name for name in needed if name not in result.columns]
+        if lacking:
+            raise ResultError(f"{label}: {lacking[0]} was not recorded")
+    return results

@@ -1,17 +1,25 @@
 """The command `mog compare`: parses options and prints."""
 
 import json
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .reading import suffix_of
-from .shared_options import SettingsOption, SettleTimeOption, StepOption, StopTimeOption, ToleranceOption
+from .shared_options import (
+    ForceOption,
+    SettingsOption,
+    SettleTimeOption,
+    StepOption,
+    StopTimeOption,
+    ToleranceOption,
+    output_option,
+)
 
 if TYPE_CHECKING:
     from .compare import Comparison
-    from .model import Value
+    from .model import Model, Value
 
 EXAMPLES = r"""Set runs side by side: settling time, overshoot, control energy, final error, events.
 
@@ -25,8 +33,6 @@ EXAMPLES = r"""Set runs side by side: settling time, overshoot, control energy, 
 
     mog compare first.parquet second.parquet --json
     """
-
-RESULTS = (".csv", ".parquet")
 
 
 def register(app: typer.Typer) -> None:
@@ -67,6 +73,7 @@ def compare(
     figure: Annotated[
         Path | None, typer.Option(help="Draw the errors over time (.pdf, .svg, .png).", show_default=False)
     ] = None,
+    force: ForceOption = False,  # noqa: FBT002
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,  # noqa: FBT002
 ) -> None:
     """Set runs side by side."""
@@ -76,23 +83,28 @@ def compare(
     from .model import read_model
     from .sweeping import Settings
     from .sweeping.options import settings_of
+    from .writing import FIGURE, RESULT
 
     fixed = settings_of(settings or [])
     wanted = dict(_variant(text) for text in variants or [])
-    games: list[Path | None] = [path for path in sources or [] if suffix_of(path) not in RESULTS]
-    files = [path for path in sources or [] if suffix_of(path) in RESULTS]
+    games: list[Path | None] = [path for path in sources or [] if not RESULT.takes(path)]
+    files = [path for path in sources or [] if RESULT.takes(path)]
     if not files and not games:
         games = [None]
     if not games and (fixed or wanted):
         raise typer.BadParameter("results are not run again", param_hint="--variant, --set")
 
-    runs = list(compare_results(load_results(files), band=band, settle_time=settle_time).runs)
-    for game in games:
-        fmu = fmu_of(game, SOURCE_OR_RESULT)
-        model = read_model(fmu)
+    if figure is not None:
+        output_option(figure, FIGURE, inputs=sources or [], force=force, hint="--figure")
+    models = [read_model(fmu_of(game, SOURCE_OR_RESULT)) for game in games]
+    results = load_results(files, [] if figure is None else ["nash_error"])
+    _judge(models, [{**fixed, **values} for values in wanted.values()])
+
+    runs = list(compare_results(results, band=band, settle_time=settle_time).runs)
+    for game, model in zip(games, models, strict=True):
         first = next((run.metrics for run in runs if run.metrics is not None), None)
         comparison = run_variants(
-            fmu,
+            model.path,
             wanted,
             start_values=fixed,
             baselines=baselines,
@@ -114,7 +126,7 @@ def compare(
     if figure is not None:
         from .plot import plot_error, save_figure
 
-        typer.echo(save_figure(plot_error(found.results), figure), err=as_json)
+        typer.echo(save_figure(plot_error(found.results), figure, force=force), err=as_json)
 
 
 def _variant(text: str) -> "tuple[str, dict[str, Value]]":
@@ -125,6 +137,13 @@ def _variant(text: str) -> "tuple[str, dict[str, Value]]":
     if not (label.strip() and separator):
         raise typer.BadParameter(f"LABEL:NAME=VALUE,... expected, not {text!r}", param_hint="--variant")
     return label.strip(), settings_of(split_names(values), "--variant")
+
+
+def _judge(models: Sequence["Model"], values: Sequence[Mapping[str, "Value"]]) -> None:
+    """Raises VariableError for values that one of the games does not take, before any is run."""
+    for model in models:
+        for each in values:
+            model.start_values(each)
 
 
 def _print(found: "Comparison") -> None:

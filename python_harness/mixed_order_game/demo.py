@@ -5,10 +5,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from .errors import ResultError
-from .plot import paper_figures, save_figure
-from .results import write_whole
+from .model import read_model
+from .plot import paper_figure_names, paper_figures, save_figure
 from .validate import Validation, validate
+from .writing import CLAIMS, FIGURE, RESULT, check_output, write_file
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,30 +24,31 @@ def demo(
     output: Path | str,
     *,
     suffix: str = ".png",
+    force: bool = False,
     progress: Callable[[str, float], None] | None = None,
 ) -> Demo:
     """Judge every claim on an FMU and write, into the folder output, what was found.
 
-    claims.json, robust.parquet, unperturbed.parquet and the paper's figures (suffix .png, .pdf or .svg).
+    claims.json, robust.parquet, unperturbed.parquet and the paper's figures (suffix .png, .pdf or .svg). They
+    replace files of their kind, with force any; that is judged before any run.
     progress is called with what is being done and the part of it done, 0 to 1.
     Raises what validate, Result.save and save_figure raise.
     """
     output = Path(output)
-    try:
-        output.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise ResultError(f"cannot write into {output}: {error}") from error
+    kinds = {"robust.parquet": RESULT, "unperturbed.parquet": RESULT, "claims.json": CLAIMS}
+    kinds |= {f"{name}{suffix}": FIGURE for name in paper_figure_names(read_model(fmu))}
+    for name, kind in kinds.items():
+        check_output(output / name, kind, inputs=[Path(fmu)], force=force)
     validation = validate(fmu, progress=progress)
+    claims = (json.dumps(validation.as_json(), indent=2) + "\n").encode()
     files = [
-        validation.robust.save(output / "robust.parquet"),
-        validation.plain.save(output / "unperturbed.parquet"),
-        output / "claims.json",
+        validation.robust.save(output / "robust.parquet", force=force),
+        validation.plain.save(output / "unperturbed.parquet", force=force),
+        write_file(output / "claims.json", CLAIMS, lambda file: file.write(claims), force=force),
     ]
-    claims = json.dumps(validation.as_json(), indent=2) + "\n"
-    write_whole(files[-1], lambda file: file.write(claims.encode()))
     figures = paper_figures(validation.robust, validation.plain)
     for number, (name, axes) in enumerate(figures.items(), start=1):
-        files.append(save_figure(axes, output / f"{name}{suffix}"))
+        files.append(save_figure(axes, output / f"{name}{suffix}", force=force))
         if progress is not None:
             progress("figures", number / len(figures))
     return Demo(validation, tuple(files))

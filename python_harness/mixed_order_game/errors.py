@@ -38,7 +38,7 @@ class SimulationError(MixedOrderGameError):
 
 
 class ResultError(MixedOrderGameError):
-    """A result file that cannot be read or written, or a signal that was not recorded."""
+    """A file that cannot be read, written or replaced, or a signal that was not recorded."""
 
 
 class PlotError(MixedOrderGameError):

@@ -18,9 +18,11 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
 from .errors import PlotError
+from .model import Model
 from .names import parse_name
 from .reading import suffix_of
-from .results import FloatArray, Result, write_whole
+from .results import FloatArray, Result
+from .writing import FIGURE, write_file
 
 COLUMN_WIDTH = 3.5
 """Width of a column of a two-column paper, in inches."""
@@ -33,8 +35,6 @@ TWO_COLUMNS = 5.0
 
 PLANE = 2
 """Coordinates of a game whose paths can be drawn."""
-
-FORMATS = (".pdf", ".svg", ".png")
 
 PALETTE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#F0E442")
 LINE_STYLES: tuple[Literal["-", "--", ":", "-."], ...] = ("-", "--", ":", "-.")
@@ -51,6 +51,11 @@ SMALLEST_INSET = 0.25
 """Least height of the inset, as a part of the axes."""
 
 EQUILIBRIUM = "0.45"
+
+SECOND_ORDER = 2
+
+CREATOR = "mixed-order-game"
+"""What the files say of themselves, so that they are known again."""
 
 STYLE: Mapping[str, Any] = {
     "font.size": 8.0,
@@ -187,6 +192,14 @@ def plot_plane(
     return axes
 
 
+def paper_figure_names(model: Model) -> list[str]:
+    """Names of the files that paper_figures draws for a game."""
+    runs = ("robust", "unperturbed")
+    kinds = ("positions", "velocities") if SECOND_ORDER in model.order else ("positions",)
+    names = [f"{kind}_{run}" for run in runs for kind in kinds]
+    return [*names, "error", *(["plane"] if model.dimension == PLANE else [])]
+
+
 def paper_figures(robust: Result, plain: Result, *, width: float = COLUMN_WIDTH) -> dict[str, Axes]:
     """The paper's four figures by file name, then the error of both runs and, for D = 2, the robust paths.
 
@@ -218,16 +231,21 @@ def result_figures(result: Result, *, width: float = COLUMN_WIDTH) -> dict[str, 
     return figures
 
 
-def save_figure(axes: Axes, path: Path | str) -> Path:
+def save_figure(axes: Axes, path: Path | str, *, force: bool = False) -> Path:
     """Write the figure of these axes as .pdf, .svg or .png; equal figures give equal bytes. Returns the path.
 
-    Raises PlotError for another suffix, ResultError if the file cannot be written.
+    Replaces a figure of this package, with force any file. Raises PlotError for another suffix, ResultError
+    if the file cannot be written or is not replaced.
     """
     path = Path(path)
+    if not FIGURE.takes(path):
+        raise PlotError(f"{path} must end in {FIGURE.ending}")
     suffix = suffix_of(path)
-    if suffix not in FORMATS:
-        raise PlotError(f"{path} must end in {', '.join(FORMATS)}")
-    dates = {".pdf": {"CreationDate": None}, ".svg": {"Date": None}, ".png": {}}
+    metadata = {
+        ".pdf": {"Creator": CREATOR, "CreationDate": None},
+        ".svg": {"Creator": CREATOR, "Date": None},
+        ".png": {"Software": CREATOR},
+    }
     figure = axes.get_figure(root=True)
     if figure is None:
         raise PlotError("these axes belong to no figure")
@@ -239,11 +257,10 @@ def save_figure(axes: Axes, path: Path | str) -> Path:
                 format=suffix[1:],
                 bbox_inches="tight",
                 pad_inches=0.02,
-                metadata=dates[suffix],
+                metadata=metadata[suffix],
             )
 
-    write_whole(path, write)
-    return path
+    return write_file(path, FIGURE, write, force=force)
 
 
 def new_axes(width: float = COLUMN_WIDTH, height: float | None = None) -> Axes:

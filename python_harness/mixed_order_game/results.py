@@ -6,8 +6,7 @@ N players, D coordinates, q neurons, T samples. Actions carry the game's own len
 import csv
 import importlib
 import json
-import tempfile
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
@@ -18,6 +17,7 @@ from numpy.typing import NDArray
 from .errors import ResultError, reason
 from .names import gather, indices_of, parse_name
 from .reading import ReadError, expect_file, number_of, read_table, suffix_of
+from .writing import RESULT, write_file
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -215,21 +215,14 @@ class Result:
         dataset: xarray.Dataset = package.Dataset(arrays, coords=labels, attrs=self._metadata(flat=True))
         return dataset
 
-    def save(self, path: Path | str) -> Path:
+    def save(self, path: Path | str, *, force: bool = False) -> Path:
         """Write a .csv file (values only) or a .parquet file (with the metadata). Returns the path.
 
-        Values are exact in both. Raises ResultError for another suffix or a file that cannot be written.
+        Values are exact in both. Replaces a result, with force any file. Raises ResultError for another
+        suffix and for a file that cannot be written or is not replaced.
         """
-        path = Path(path)
-        writers: dict[str, Callable[[IO[bytes]], object]] = {
-            ".csv": self._write_csv,
-            ".parquet": self._write_parquet,
-        }
-        suffix = suffix_of(path)
-        if suffix not in writers:
-            raise ResultError(f"{path} must end in .csv or .parquet")
-        write_whole(path, writers[suffix])
-        return path
+        write = self._write_csv if suffix_of(path) == ".csv" else self._write_parquet
+        return write_file(path, RESULT, write, force=force)
 
     def _write_csv(self, file: IO[bytes]) -> None:
         import io
@@ -316,22 +309,3 @@ def _optional(package: str) -> Any:
 
 def _largest(array: FloatArray, chosen: NDArray[np.bool_]) -> float:
     return float(np.max(np.abs(array[chosen])))
-
-
-def write_whole(path: Path, write: Callable[[IO[bytes]], object]) -> None:
-    """Write under a temporary name and rename, so that no half-written file keeps the name."""
-    temporary = None
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.NamedTemporaryFile(
-            dir=path.parent, prefix=f".{path.name}.", suffix=".part", delete=False
-        ) as file:
-            temporary = Path(file.name)
-            write(file)
-        temporary.chmod(0o644)
-        temporary.replace(path)
-    except OSError as error:
-        raise ResultError(f"cannot write {path}: {reason(error)}") from error
-    finally:
-        if temporary is not None:
-            temporary.unlink(missing_ok=True)

@@ -19,7 +19,7 @@ from .graphs import CommunicationGraph, edge_values, graphs_of_text
 from .model import Model, Value, check_value
 from .names import parse_name
 from .reading import ReadError, number_of, read_table, read_text, suffix_of, toml_of
-from .results import write_whole
+from .writing import DISTURBANCE, GRAPH_SCHEDULE, Kind, write_file
 
 FloatArray = NDArray[np.float64]
 
@@ -231,23 +231,31 @@ def _disturbance(path: Path, model: Model, *, linear: bool) -> Disturbance:
     return Disturbance(np.array([time for time, _ in rows]), values, linear)
 
 
-def write_disturbance(path: Path | str, time: ArrayLike, values: ArrayLike) -> Path:
-    """Write d_ext, time (T,) in s and values (T, N, D), as the CSV file that read_disturbance reads."""
+def write_disturbance(path: Path | str, time: ArrayLike, values: ArrayLike, *, force: bool = False) -> Path:
+    """Write d_ext, time (T,) in s and values (T, N, D), as the CSV file that read_disturbance reads.
+
+    Replaces a table of d_ext, with force any file. Raises ScheduleError for other shapes, ResultError if the
+    file cannot be written or is not replaced.
+    """
     times, array = np.asarray(time, dtype=np.float64), np.asarray(values, dtype=np.float64)
     _check_shapes(times, array)
     _, players, dimension = array.shape
     names = [f"d_ext[{i},{k}]" for i in range(1, players + 1) for k in range(1, dimension + 1)]
     rows = np.column_stack([times, array.reshape(len(times), -1)])
-    return _write_table(Path(path), names, rows.tolist())
+    return _write_table(path, DISTURBANCE, names, rows.tolist(), force=force)
 
 
-def write_graph_schedule(path: Path | str, schedule: GraphSchedule) -> Path:
-    """Write a schedule without period as the CSV file that read_graph_schedule reads."""
+def write_graph_schedule(path: Path | str, schedule: GraphSchedule, *, force: bool = False) -> Path:
+    """Write a schedule without period as the CSV file that read_graph_schedule reads.
+
+    Replaces a table of edges, with force any file. Raises ScheduleError for a schedule with a period,
+    ResultError if the file cannot be written or is not replaced.
+    """
     if schedule.period is not None:
         raise ScheduleError("a CSV file holds no period: write the entries of one run, or TOML")
     names = list(dict.fromkeys(name for _, weights in schedule.entries for name in weights))
     rows = [[time, *(weights.get(name, "") for name in names)] for time, weights in schedule.entries]
-    return _write_table(Path(path), names, rows)
+    return _write_table(path, GRAPH_SCHEDULE, names, rows, force=force)
 
 
 def _check_shapes(time: FloatArray, values: FloatArray) -> None:
@@ -269,7 +277,9 @@ def _read_table(path: Path) -> tuple[list[str], list[tuple[float, list[float]]]]
     return header[1:], rows
 
 
-def _write_table(path: Path, names: Sequence[str], rows: Iterable[Sequence[object]]) -> Path:
+def _write_table(
+    path: Path | str, kind: Kind, names: Sequence[str], rows: Iterable[Sequence[object]], *, force: bool
+) -> Path:
     import io
 
     def write(file: IO[bytes]) -> None:
@@ -280,8 +290,7 @@ def _write_table(path: Path, names: Sequence[str], rows: Iterable[Sequence[objec
         text.flush()
         text.detach()
 
-    write_whole(path, write)
-    return path
+    return write_file(path, kind, write, force=force)
 
 
 def _cell(text: str, row: int) -> float:

@@ -1,9 +1,12 @@
 """Arguments and options that several commands have in common."""
 
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Annotated
 
 import typer
+
+from .writing import Kind, check_output
 
 GameArgument = Annotated[
     Path | None,
@@ -36,3 +39,17 @@ BandOption = Annotated[
     float | None,
     typer.Option(help="Largest |x - x*| that counts as settled.", show_default="2 % of the initial one"),
 ]
+
+ForceOption = Annotated[bool, typer.Option("--force", help="Replace a file of another kind.")]
+
+
+def output_option(
+    path: Path, kind: Kind, *, inputs: Iterable[Path | None] = (), force: bool, hint: str = "--output"
+) -> Path:
+    """The path of a file to write, judged before any work.
+
+    Raises typer.BadParameter for its suffix, ResultError where check_output does.
+    """
+    if not kind.takes(path):
+        raise typer.BadParameter(f"the file must end in {kind.ending}", param_hint=hint)
+    return check_output(path, kind, inputs=inputs, force=force)

@@ -10,12 +10,14 @@ from .designs import Sampling
 from .graphs import GRAPHS_HELP
 from .shared_options import (
     BandOption,
+    ForceOption,
     GameArgument,
     SettingsOption,
     SettleTimeOption,
     StepOption,
     StopTimeOption,
     ToleranceOption,
+    output_option,
 )
 
 if TYPE_CHECKING:
@@ -119,6 +121,7 @@ def sweep(
             help="Draw the median of a figure over two columns, into the folder; repeatable.",
         ),
     ] = None,
+    force: ForceOption = False,  # noqa: FBT002
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,  # noqa: FBT002
 ) -> None:
     """Run a game many times."""
@@ -128,6 +131,7 @@ def sweep(
     from .sweeping import Settings, Sweep, connected_graphs_example
     from .sweeping import sweep as conduct
     from .sweeping.options import counted_progress, graphs_option, pairs_of, range_option, settings_of
+    from .writing import FIGURE
 
     maps = [_heat_map(text) for text in heat_maps or []]
     fixed = settings_of(settings or [])
@@ -159,6 +163,11 @@ def sweep(
             ),
             neighbourhood=neighbourhood,
         )
+    if maps:
+        from .sweeping import check_heat_map  # needs matplotlib
+    for names in maps:
+        check_heat_map(definition, *names)
+        output_option(_map_file(output, names), FIGURE, force=force, hint="--heat-map")
     try:
         with counted_progress("sweeping") as show:
             result = conduct(
@@ -167,7 +176,7 @@ def sweep(
     except KeyboardInterrupt:
         typer.echo(f"mog: interrupted; the same command goes on with the rows in {output}", err=True)
         raise typer.Exit(1) from None
-    _show(result, definition, maps, as_json=as_json)
+    _show(result, definition, maps, as_json=as_json, force=force)
 
 
 def _heat_map(text: str) -> tuple[str, str, str]:
@@ -179,8 +188,18 @@ def _heat_map(text: str) -> tuple[str, str, str]:
     return names[0], names[1], names[2]
 
 
+def _map_file(folder: Path, names: tuple[str, str, str]) -> Path:
+    plain = "_".join("".join(c if c.isalnum() else "-" for c in each) for each in names)
+    return folder / f"heat_map_{plain}.pdf"
+
+
 def _show(
-    result: "SweepResult", definition: "Sweep", maps: list[tuple[str, str, str]], *, as_json: bool
+    result: "SweepResult",
+    definition: "Sweep",
+    maps: list[tuple[str, str, str]],
+    *,
+    as_json: bool,
+    force: bool,
 ) -> None:
     from .plot import save_figure
     from .sweeping import plot_heat_map
@@ -190,9 +209,8 @@ def _show(
         typer.echo(json.dumps(_data(result, missed, definition.neighbourhood), indent=2))
     else:
         _print(result, definition)
-    for x, y, value in maps:
-        name = "_".join("".join(c if c.isalnum() else "-" for c in each) for each in (x, y, value))
-        path = save_figure(plot_heat_map(result, x, y, value), result.folder / f"heat_map_{name}.pdf")
+    for names in maps:
+        path = save_figure(plot_heat_map(result, *names), _map_file(result.folder, names), force=force)
         typer.echo(path, err=as_json)
     failed = result.failed.tolist()
     if missed:

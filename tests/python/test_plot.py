@@ -140,5 +140,5 @@ def test_files_are_reproducible(suffix: str, begin: bytes, tmp_path: Path) -> No
 
 
 def test_unknown_format(tmp_path: Path) -> None:
-    with pytest.raises(PlotError, match=r"must end in \.pdf, \.svg, \.png"):
+    with pytest.raises(PlotError, match=r"must end in \.pdf, \.svg or \.png"):
         plot.save_figure(plot.new_axes(), tmp_path / "a.bmp")

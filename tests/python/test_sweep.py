@@ -23,6 +23,7 @@ from mixed_order_game.sweeping import (
     Sweep,
     SweepError,
     SweepResult,
+    check_heat_map,
     connected_graphs_example,
     load_sweep,
     plot_edges,
@@ -203,6 +204,27 @@ def test_two_sweeps_do_not_share_a_folder(fmu: Path, tmp_path: Path) -> None:
         load_sweep(tmp_path)
 
 
+def test_folder_of_a_start_that_was_killed(fmu: Path, tmp_path: Path) -> None:
+    """Killed while it wrote its first file, and later while it wrote rows."""
+    folder = tmp_path / "s"
+
+    def killed_while_writing(name: str) -> None:
+        text = (
+            "import os, pathlib\n"
+            "from mixed_order_game.writing import write_whole\n"
+            f"write_whole(pathlib.Path({str(folder / name)!r}), lambda _: os.kill(os.getpid(), 9))"
+        )
+        assert subprocess.run([sys.executable, "-c", text], check=False).returncode == -signal.SIGKILL
+
+    killed_while_writing("sweep.json")
+    assert len(list(folder.iterdir())) == 1
+    assert sweep(Sweep(fmu=fmu, grid={"k1": (5.0, 6.0)}, settings=SHORT), folder, jobs=1).complete
+    killed_while_writing("rows/00000000.parquet")
+    other = Sweep(fmu=fmu, grid={"k1": (5.0, 7.0)}, settings=SHORT)
+    assert sweep(other, folder, jobs=1, restart=True).complete
+    assert {path.name for path in folder.iterdir()} <= {".lock", "sweep.json", "results.parquet"}
+
+
 def test_runs_that_the_fmu_gives_up(fmu: Path, tmp_path: Path) -> None:
     values = {"robust": False, "x0[2,1]": 1000.0}
     definition = Sweep(fmu=fmu, fixed=values, grid={"k1": (0.1, 10.0), "perturbed": (True, False)})
@@ -297,6 +319,34 @@ def test_heat_maps(swept: SweepResult, tmp_path: Path) -> None:
     assert not np.isnan(array[0, 1])
     with pytest.raises(PlotError, match="does not vary"):
         plot_heat_map(one_k1(swept), "k1", "k2", "events")
+
+
+@pytest.mark.parametrize(
+    ("names", "told"),
+    [
+        (("k1", "k2", "nonsense"), "no column nonsense"),
+        (("graph", "k2", "events"), "graph is text"),
+        (("k1", "k4", "events"), "k4 does not vary"),
+    ],
+)
+def test_heat_maps_are_judged_before_the_sweep(names: tuple[str, str, str], told: str, fmu: Path) -> None:
+    definition = Sweep(
+        fmu=fmu,
+        grid={"k1": (5.0, 6.0), "k4": (50.0, 50.0)},
+        ranges={"k2": Range(0.5, 2.0)},
+        samples=2,
+        graphs=tuple(graphs_of_text("ring", 5)),
+        initial_states=2,
+    )
+    with pytest.raises((ResultError, PlotError), match=told):
+        check_heat_map(definition, *names)
+    check_heat_map(definition, "k1", "k2", "settling_time")
+    check_heat_map(definition, "x0[3,1]", "final_error", "k4")
+    assert [definition.varies(name) for name in ("graph_edges", "initial_state", "sample")] == [
+        False,
+        True,
+        True,
+    ]
 
 
 def one_k1(result: SweepResult) -> SweepResult:

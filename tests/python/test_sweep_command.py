@@ -9,7 +9,7 @@ from typer.testing import CliRunner, Result
 
 from mixed_order_game import compare_command, run, sweep_command, tune_command
 from mixed_order_game.cli import ErrorsAsSentences
-from mixed_order_game.sweeping import load_sweep
+from mixed_order_game.sweeping import Sampler, load_sweep
 from mixed_order_game.sweeping.options import counted_progress
 
 app = typer.Typer(cls=ErrorsAsSentences, rich_markup_mode="rich", pretty_exceptions_enable=False)
@@ -126,6 +126,33 @@ def test_errors_of_sweep_are_one_sentence(arguments: list[str], told: str, fmu: 
     assert result.stderr.startswith("mog: ")
     assert told in result.stderr
     assert len(result.stderr.strip().splitlines()) == 1
+
+
+def test_heat_map_is_judged_before_any_run(fmu: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "s"
+    arguments = ["sweep", fmu, "--output", folder, "--grid", "k1=1,2", "--grid", "k2=1,2", "--heat-map"]
+    wrong = mog(*arguments, "k1,k2,settling")
+    assert wrong.exit_code == 1
+    assert "the sweep has no column settling" in wrong.stderr
+    assert not folder.exists()
+    folder.mkdir()
+    (folder / "heat_map_k1_k2_events.pdf").write_text("mine")
+    assert "exists and is not a figure" in mog(*arguments, "k1,k2,events").stderr
+
+
+def test_compare_judges_all_games_before_any_run(
+    fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(Sampler, "record", lambda *_: pytest.fail("it was run"))
+    for arguments, told in (
+        ([fmu, tmp_path / "none.fmu"], "there is no FMU"),
+        ([fmu, "--variant", "a: k1=20", "--variant", "b: k9=1"], "there is no variable k9"),
+        ([fmu, "--figure", tmp_path / "mine.pdf"], "is not a figure"),
+    ):
+        (tmp_path / "mine.pdf").write_text("mine")
+        result = mog("compare", *arguments)
+        assert result.exit_code == 1
+        assert told in result.stderr
 
 
 def test_tune(fmu: Path) -> None:

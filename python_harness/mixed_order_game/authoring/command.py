@@ -5,6 +5,8 @@ from typing import Annotated
 
 import typer
 
+from ..shared_options import ForceOption, output_option
+
 
 def register(app: typer.Typer) -> None:
     """Add the commands to the application."""
@@ -46,18 +48,14 @@ def new(
     mog new large.toml --players 60 --graph small-world:6:0.1 --seed 3
     """
     from ..errors import GameError
-    from ..reading import suffix_of
-    from ..results import write_whole
+    from ..writing import GAME, write_file
     from .check_game import check_game
     from .new_game import Recipe, new_game
 
-    if suffix_of(output) != ".toml":
-        raise typer.BadParameter("the file must end in .toml", param_hint="OUTPUT")
-    if output.exists() and not force:
-        raise GameError(f"{output} exists: name another file or add --force")
+    output_option(output, GAME, force=force, hint="OUTPUT")
     recipe = Recipe(players, dimension, orders, graph, seed, title, schema)
     text = new_game(recipe)
-    write_whole(output, lambda file: file.write(text.encode()))
+    write_file(output, GAME, lambda file: file.write(text.encode()), force=force)
     problems = check_game(output)
     if problems:
         raise GameError(f"{output}:{problems[0].line}: {problems[0].sentence}")
@@ -95,17 +93,18 @@ def schema(
     output: Annotated[
         Path | None, typer.Option("--output", "-o", help="Write it to a file.", show_default=False)
     ] = None,
+    force: ForceOption = False,  # noqa: FBT002
 ) -> None:
     """Print the JSON Schema of game files, which lets an editor complete and check them.
 
     [bold]Example:[/bold] mog schema --output game.schema.json
     """
-    from ..results import write_whole
+    from ..writing import SCHEMA, write_file
     from .schema import schema_path
 
     text = schema_path().read_text(encoding="utf-8")
     if output is None:
         typer.echo(text, nl=False)
     else:
-        write_whole(output, lambda file: file.write(text.encode()))
-        typer.echo(output)
+        output_option(output, SCHEMA, force=force)
+        typer.echo(write_file(output, SCHEMA, lambda file: file.write(text.encode()), force=force))

@@ -5,6 +5,8 @@ from typing import Annotated
 
 import typer
 
+from ..shared_options import ForceOption, output_option
+
 
 def register(app: typer.Typer) -> None:
     """Add the command to the application."""
@@ -34,6 +36,7 @@ def report(
         bool,
         typer.Option("--claims/--no-claims", help="Judge the paper's claims, which takes three more runs."),
     ] = True,
+    force: ForceOption = False,  # noqa: FBT002
 ) -> None:
     r"""Write one HTML page about a game or a run: interactive figures, claims, parameters, provenance.
 
@@ -48,12 +51,11 @@ def report(
     mog run --output run.parquet
     mog report run.parquet
     """
-    from ..reading import suffix_of
     from ..sweeping.options import settings_of
+    from ..writing import PAGE
     from .page import report as write_report
 
-    if suffix_of(output) != ".html":
-        raise typer.BadParameter("the file must end in .html", param_hint="--output")
+    output_option(output, PAGE, inputs=[source], force=force)
     changes = settings_of(settings or [])
     done = write_report(
         source,
@@ -61,6 +63,7 @@ def report(
         changes=changes,
         claims=claims,
         stop_time=stop_time,
+        force=force,
     )
     typer.echo(done.path)
     validation = done.evidence.validation

@@ -16,9 +16,9 @@ from ..model import Value, provenance
 from ..names import parse_name
 from ..parameters import game_parameters
 from ..plot import edges_of
-from ..reading import suffix_of
-from ..results import Result, load, write_whole
+from ..results import Result, load
 from ..version import package_version
+from ..writing import PAGE, RESULT, check_output, write_file
 from .evidence import Evidence, energy_so_far, evidence_of_game, evidence_of_result
 from .figures import figures
 
@@ -47,6 +47,7 @@ def report(
     changes: Mapping[str, Value] | None = None,
     claims: bool = True,
     stop_time: float | None = None,
+    force: bool = False,
     progress: Callable[[str, float], None] | None = None,
 ) -> Report:
     """Write the page of an FMU, a game file, a game of the package by name, or a stored result.
@@ -54,12 +55,14 @@ def report(
     None stands for the paper's example.
 
     changes, claims, stop_time (s) and progress: as in evidence_of_game; a stored result takes none of them.
+    The page replaces a page, with force any file but the source; that is judged before any run.
     Raises what running, judging and loading raise; ResultError if the page cannot be written.
     """
     from ..build import SOURCE_OR_RESULT, fmu_of
 
     output = Path(output)
-    if source is not None and suffix_of(source) in (".parquet", ".csv"):
+    check_output(output, PAGE, inputs=[source], force=force)
+    if source is not None and RESULT.takes(Path(source)):
         if changes or stop_time is not None:
             raise GameError(f"{source} is a stored run: it takes neither parameters nor a stop time")
         evidence = evidence_of_result(load(source))
@@ -69,7 +72,7 @@ def report(
             fmu, changes=changes, claims=claims, stop_time=stop_time, progress=progress
         )
     page = render_page(evidence)
-    write_whole(output, lambda file: file.write(page.encode()))
+    write_file(output, PAGE, lambda file: file.write(page.encode()), inputs=[source], force=force)
     return Report(output, evidence)
 
 

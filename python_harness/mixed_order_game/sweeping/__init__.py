@@ -13,7 +13,7 @@ from .sampler import Sampler, Settings
 if TYPE_CHECKING:
     from .conduct import connected_graphs_example, sweep
     from .definition import Sweep
-    from .figures import plot_edges, plot_heat_map
+    from .figures import check_heat_map, plot_edges, plot_heat_map
     from .store import SweepError
     from .table import Spread, SweepResult, load_sweep
 
@@ -25,6 +25,7 @@ __all__ = [
     "Sweep",
     "SweepError",
     "SweepResult",
+    "check_heat_map",
     "connected_graphs_example",
     "load_sweep",
     "plot_edges",
@@ -36,7 +37,7 @@ __all__ = [
 HOMES = {
     "conduct": ("connected_graphs_example", "sweep"),
     "definition": ("Sweep",),
-    "figures": ("plot_edges", "plot_heat_map"),
+    "figures": ("check_heat_map", "plot_edges", "plot_heat_map"),
     "store": ("SweepError",),
     "table": ("Spread", "SweepResult", "load_sweep"),
 }

@@ -160,6 +160,16 @@ class Sweep:
             cells["sample"] = point
         return cells | values
 
+    def varies(self, column: str) -> bool:
+        """Whether a column that describe fills has two different values in the table, or more."""
+        first = self.describe(0)[column]
+        for axis, length in enumerate(self.shape):
+            for k in range(1, length):
+                index = [k if each == axis else 0 for each in range(len(self.shape))]
+                if self.describe(int(np.ravel_multi_index(index, self.shape)))[column] != first:
+                    return True
+        return False
+
     def _row(self, row: int) -> tuple[int, int, int, dict[str, Value]]:
         graph, state, point, *indices = (int(k) for k in np.unravel_index(row, self.shape))
         values: dict[str, Value] = dict(zip(self.ranges, self._points[point].tolist(), strict=True))

@@ -1,14 +1,17 @@
 """Heat maps of a sweep, for a paper: medians over two varied columns, or over the edges of graphs."""
 
 import numpy as np
+import pyarrow as pa
 from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm, Normalize
 from numpy.typing import NDArray
 
-from ..errors import PlotError
+from ..errors import PlotError, ResultError
 from ..graphs import graph_of_text
 from ..metrics import METRIC_UNITS
 from ..plot import COLUMN_WIDTH, new_axes, paper_style
+from .definition import Sweep
+from .store import schema_of
 from .table import SweepResult
 
 FloatArray = NDArray[np.float64]
@@ -54,6 +57,24 @@ def plot_heat_map(
         _image(axes, medians, value)
         _ticks(axes, x, x_labels, y, y_labels)
     return axes
+
+
+def check_heat_map(definition: Sweep, x: str, y: str, value: str) -> None:
+    """Judge the columns of a heat map before a sweep is run.
+
+    Raises ResultError for a column that the table will not have or that is text, PlotError if x or y does not
+    vary.
+    """
+    columns = schema_of(definition)
+    for name in (x, y, value):
+        if name not in columns.names:
+            raise ResultError(f"the sweep has no column {name}: it has {', '.join(columns.names)}")
+        if pa.types.is_string(columns.field(name).type):
+            raise ResultError(f"{name} is text: it cannot be drawn")
+    described = definition.describe(0)
+    for name in (x, y):
+        if name in described and not definition.varies(name):
+            raise PlotError(f"{name} does not vary in this sweep")
 
 
 def plot_edges(

@@ -18,7 +18,7 @@ import pyarrow.parquet as pq
 
 from ..errors import MixedOrderGameError, ResultError
 from ..metrics import METRIC_UNITS
-from ..results import write_whole
+from ..writing import is_partial, write_whole
 from .definition import Sweep
 from .pool import Outcome
 
@@ -43,10 +43,13 @@ class Store:
         self._next = 0
         self._schema = schema_of(sweep)
         definition = folder / DEFINITION
-        if restart:
+        for path in (*folder.glob("*"), *(folder / ROWS).glob("*")):
+            if is_partial(path):  # left by a start that was killed
+                path.unlink(missing_ok=True)
+        if restart:  # the definition last: without it the folder is nobody's
+            shutil.rmtree(folder / ROWS, ignore_errors=True)
             for path in (folder / RESULTS, definition):
                 path.unlink(missing_ok=True)
-            shutil.rmtree(folder / ROWS, ignore_errors=True)
         if definition.is_file():
             self._check(definition)
         elif folder.is_dir() and any(path.name != LOCK for path in folder.iterdir()):
