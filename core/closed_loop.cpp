@@ -31,13 +31,9 @@ void ClosedLoop::evaluate_errors(const Real* state, Signals& signals) const {
   for (int l = 0; l < shape.dimension; ++l) {
     for (int i = 0; i < shape.players; ++i) {
       const int p = l * shape.players + i;
-      if (shape.is_second_order(i)) {
-        signals.shared[at(p)] = x[p];
-        e[p] = reference[p] + gains.k2 * gradient[p];  // e_i = v_i + k2 grad_i f_i(y_i)
-      } else {
-        signals.shared[at(p)] = reference[p];
-        e[p] = x[p] - reference[p];  // e_i = x_i - z_i
-      }
+      const bool second = shape.is_second_order(i);
+      signals.shared[at(p)] = terms::shared_signal(second, x[p], reference[p]);
+      e[p] = terms::error(second, x[p], reference[p], gains.k2, gradient[p]);
     }
   }
 }
@@ -108,12 +104,11 @@ void ClosedLoop::evaluate(Real t, const Real* state, const Real* d_ext, const Mo
     for (int i = 0; i < players; ++i) {
       const int p = l * players + i;
       const bool second = shape.is_second_order(i);
-      // u_i = -k1 e_i - W_i' S_i - phi_i (order 1), -k4 e_i - W_i' S_i - phi_i (order 2)
-      const Real u = -(second ? gains.k4 : gains.k1) * e[p] - s[p] - phi[p];
+      const Real u = terms::control(second ? gains.k4 : gains.k1, e[p], s[p], phi[p]);
       const Real driven = u + g[p] + d[p];
       signals.control[at(p)] = u;
-      rate[layout_.x() + p] = second ? reference[p] : driven;                     // x' = v or x' = u + g + d
-      rate[layout_.reference() + p] = second ? driven : -gains.k2 * gradient[p];  // v' = u + g + d or z' = -k2 grad
+      rate[layout_.x() + p] = second ? reference[p] : driven;  // x' = v or x' = u + g + d
+      rate[layout_.reference() + p] = second ? driven : terms::reference_rate(gains.k2, gradient[p]);
     }
   }
   kernel.estimate_rates(players, shape.dimension, graph.neighbours(), gains.k3, state + layout_.estimates(),

@@ -3,14 +3,12 @@
 // Plants, seeking laws, estimates, network and adaptation of the mixed-order game; notation.md lists the symbols.
 #pragma once
 
+#include "loop/terms.hpp"
 #include "parameters.hpp"
 #include "signals.hpp"
 #include "state_layout.hpp"
 
 namespace mixed_order_game {
-
-/// K = exp(-(K + 1)), the constant of the robust term's bound.
-inline constexpr Real robust_term_constant = 0.2784645427610738;
 
 class ClosedLoop {
  public:

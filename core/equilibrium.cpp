@@ -160,8 +160,10 @@ std::vector<Real> nash_equilibrium_along(const Cost& cost, const Cost& direction
   std::vector<Real> hessian(at(pattern.entries()));
   std::vector<Real> along(at(shape.actions()));
   cost.hessian_rows(x_star, 0, hessian.data());
-  cost.own_gradients_along(direction, x_star, 0, along.data());
-  for (Real& entry : along) entry = -entry;
+  const std::vector<Dual> x(x_star, x_star + along.size());
+  std::vector<Dual> gradient(along.size());
+  cost.own_gradients(CoefficientsAlong(cost.coefficients, &direction.coefficients), x.data(), 0, gradient.data());
+  for (std::size_t p = 0; p < along.size(); ++p) along[p] = -gradient[p].along;
   solve_in_place(pattern, hessian, along);
   return along;
 }

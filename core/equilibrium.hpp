@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "cost.hpp"
+#include "families/cost.hpp"
 
 namespace mixed_order_game {
 

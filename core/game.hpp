@@ -6,9 +6,6 @@
 #include <vector>
 
 #include "parameters.hpp"
-#include "polynomial_dynamics.hpp"
-#include "quadratic_cost.hpp"
-#include "sinusoidal_disturbance.hpp"
 
 namespace mixed_order_game {
 
@@ -22,15 +19,6 @@ struct Game {
   std::vector<std::string> player_names;
   Parameters parameters;
 };
-
-/// The family's coefficients inside parameters that were made by parse_game.
-inline QuadraticCost& cost_of(Parameters& parameters) { return static_cast<QuadraticCost&>(*parameters.cost); }
-inline PolynomialDynamics& dynamics_of(Parameters& parameters) {
-  return static_cast<PolynomialDynamics&>(*parameters.dynamics);
-}
-inline SinusoidalDisturbance& disturbance_of(Parameters& parameters) {
-  return static_cast<SinusoidalDisturbance&>(*parameters.disturbance);
-}
 
 /// Reads a game definition (TOML). Throws GameError with one sentence that names the entry, its value and what was
 /// expected: syntax, missing and unknown keys, lengths, ranges, a disconnected graph, no unique equilibrium.

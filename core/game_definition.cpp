@@ -4,6 +4,9 @@
 
 #include "equilibrium.hpp"
 #include "errors.hpp"
+#include "families/polynomial_dynamics.hpp"
+#include "families/quadratic_cost.hpp"
+#include "families/sinusoidal_disturbance.hpp"
 #include "game.hpp"
 #include "toml_reader.hpp"
 
@@ -142,46 +145,43 @@ void read_pairs(const TomlEntry& list, int players, std::string_view pair, Read 
   }
 }
 
-void read_cost(const TomlEntry& table, int i, const Shape& shape, QuadraticCost& cost) {
-  table.accept_keys({"quadratic", "linear", "constant", "coupling"});
-  cost.quadratic[at(i)] = table["quadratic"].number_or(0.0);
-  cost.constant[at(i)] = table["constant"].number_or(0.0);
-  table["linear"].numbers_if_present(shape.dimension, shape.players, &cost.linear[at(i)]);
-  read_pairs(table["coupling"], shape.players, "[j, c_ij]", [&](int j, const TomlEntry& value) {
-    if (j == i) value.fail("no coupling of player " + std::to_string(i + 1) + " with itself");
-    cost.coupling[at(i) * at(shape.players) + at(j)] = value.number();
-  });
-}
-
-void read_dynamics(const TomlEntry& table, int i, const Shape& shape, std::vector<PolynomialTerm>& terms) {
-  table.accept_keys({"linear", "square"});
-  const int D = shape.dimension;
-  std::vector<std::vector<PolynomialTerm>> of_player(at(shape.players));  // by j, then l; empty where j is not named
-  const auto read = [&](std::string_view key, Real PolynomialTerm::* coefficient) {
-    read_pairs(table[key], shape.players, "[j, coefficients]", [&](int j, const TomlEntry& value) {
-      std::vector<Real> coefficients(at(D));
-      value.numbers(D, 1, coefficients.data());
-      auto& own = of_player[at(j)];
-      if (own.empty()) {
-        for (int l = 0; l < D; ++l) own.push_back({.player = i, .other = j, .coordinate = l});
-      }
-      for (int l = 0; l < D; ++l) own[at(l)].*coefficient = coefficients[at(l)];
-    });
-  };
-  read("linear", &PolynomialTerm::linear);
-  read("square", &PolynomialTerm::square);
-  for (const auto& own : of_player) {
-    std::copy_if(own.begin(), own.end(), std::back_inserter(terms),
-                 [](const PolynomialTerm& term) { return term.linear != 0.0 || term.square != 0.0; });
+// Sets every coefficient of a family that the player's table has a key for.
+void read_coefficients(const TomlEntry& table, int i, const Shape& shape, Coefficients& coefficients) {
+  std::vector<std::string_view> keys;
+  for (const Coefficient& declared : coefficients.declared()) {
+    if (declared.key != nullptr) keys.emplace_back(declared.key);
   }
-}
-
-void read_disturbance(const TomlEntry& table, int i, const Shape& shape, SinusoidalDisturbance& disturbance) {
-  table.accept_keys({"amplitude", "frequency", "phase", "bias"});
-  table["amplitude"].numbers_if_present(shape.dimension, shape.players, &disturbance.amplitude[at(i)]);
-  table["frequency"].numbers_if_present(shape.dimension, shape.players, &disturbance.frequency[at(i)]);
-  table["phase"].numbers_if_present(shape.dimension, shape.players, &disturbance.phase[at(i)]);
-  table["bias"].numbers_if_present(shape.dimension, shape.players, &disturbance.bias[at(i)]);
+  table.accept_keys(keys);
+  for (int number = 0; number < static_cast<int>(coefficients.declared().size()); ++number) {
+    const Coefficient& declared = coefficients.declared()[at(number)];
+    if (declared.key == nullptr) continue;
+    const TomlEntry entry = table[declared.key];
+    std::vector<Real> values(at(shape.dimension));
+    const std::string pair = std::string("[j, ") + (declared.symbol == nullptr ? "" : declared.symbol) + "]";
+    switch (declared.indices) {
+      case Indices::player:
+        coefficients.set(number, i, entry.number_or(0.0));
+        break;
+      case Indices::entry:
+        entry.numbers_if_present(shape.dimension, 1, values.data());
+        for (int l = 0; l < shape.dimension; ++l) coefficients.set(number, shape.entry(i, l), values[at(l)]);
+        break;
+      case Indices::pair:
+        read_pairs(entry, shape.players, pair, [&](int j, const TomlEntry& value) {
+          if (j == i) value.fail("no " + std::string(declared.key) + " of player " + std::to_string(i + 1) + " with itself");
+          coefficients.set(number, i * shape.players + j, value.number());
+        });
+        break;
+      case Indices::term:
+        read_pairs(entry, shape.players, pair, [&](int j, const TomlEntry& value) {
+          value.numbers(shape.dimension, 1, values.data());
+          for (int l = 0; l < shape.dimension; ++l) {
+            if (values[at(l)] != 0.0) coefficients.set(number, shape.entry(i, l) * shape.players + j, values[at(l)]);
+          }
+        });
+        break;
+    }
+  }
 }
 
 void read_initial_state(const TomlEntry& player, int i, const Shape& shape, InitialState& initial) {
@@ -262,19 +262,18 @@ Game parse_game(std::string_view toml) {
   const std::vector<std::string> names = read_names(players, shape.players);
 
   QuadraticCost cost(shape.players, shape.dimension);
-  std::vector<PolynomialTerm> terms;
-  SinusoidalDisturbance disturbance(n);
+  PolynomialDynamics dynamics(shape.players, shape.dimension);
+  SinusoidalDisturbance disturbance(shape.players, shape.dimension);
   InitialState initial{.x = std::vector<Real>(at(n)),
                        .reference = std::vector<Real>(at(n)),
                        .y = std::vector<Real>(at(shape.players) * at(n))};
   for (int i = 0; i < shape.players; ++i) {
     const TomlEntry player = players.item(at(i));
     read_initial_state(player, i, shape, initial);
-    read_cost(player["cost"], i, shape, cost);
-    read_dynamics(player["dynamics"], i, shape, terms);
-    read_disturbance(player["disturbance"], i, shape, disturbance);
+    read_coefficients(player["cost"], i, shape, cost.coefficients);
+    read_coefficients(player["dynamics"], i, shape, dynamics.coefficients);
+    read_coefficients(player["disturbance"], i, shape, disturbance.coefficients);
   }
-  cost.refresh();
 
   Game read{.title = title,
             .expose = Expose::all,
@@ -285,8 +284,7 @@ Game parse_game(std::string_view toml) {
                            .rbf = read_network(rbf, shape),
                            .graph = read_graph(game["graph"], shape.players),
                            .cost = Cloned<Cost>(cost.clone()),
-                           .dynamics = Cloned<UnknownDynamics>(
-                               std::make_unique<PolynomialDynamics>(shape.players, shape.dimension, std::move(terms))),
+                           .dynamics = Cloned<UnknownDynamics>(dynamics.clone()),
                            .disturbance = Cloned<Disturbance>(disturbance.clone()),
                            .initial = std::move(initial)}};
   read.expose = read_expose(game["expose"], shape, read.parameters.rbf.diagonal);

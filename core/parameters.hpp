@@ -1,14 +1,15 @@
 // Every number that a run of the closed loop depends on besides its state, its inputs and time.
 #pragma once
 
+#include <array>
 #include <vector>
 
 #include "cloned.hpp"
 #include "communication_graph.hpp"
-#include "cost.hpp"
-#include "disturbance.hpp"
+#include "families/cost.hpp"
+#include "families/disturbance.hpp"
+#include "families/unknown_dynamics.hpp"
 #include "types.hpp"
-#include "unknown_dynamics.hpp"
 
 namespace mixed_order_game {
 
@@ -52,24 +53,27 @@ struct Parameters {
   Cloned<Disturbance> disturbance;
   InitialState initial;
 
+  /// Whatever declares coefficients, in the order of the variables.
+  [[nodiscard]] std::array<GameFamily*, 3> families() { return {&*cost, &*dynamics, &*disturbance}; }
+  [[nodiscard]] std::array<const GameFamily*, 3> families() const { return {&*cost, &*dynamics, &*disturbance}; }
+
   /// The same game with every coefficient and initial value zero, for those of a direction.
   [[nodiscard]] Parameters zero_direction() const {
-    const auto zeros = [](const std::vector<Real>& like) { return std::vector<Real>(like.size(), 0.0); };
-    return {.shape = shape,
-            .gains = {},
-            .strategy = strategy,
-            .rbf = {.diagonal = rbf.diagonal, .centers = zeros(rbf.centers)},
-            .graph = CommunicationGraph(shape.players),
-            .cost = Cloned(cost->zero_direction()),
-            .dynamics = Cloned(dynamics->zero_direction()),
-            .disturbance = Cloned(disturbance->zero_direction()),
-            .initial = {zeros(initial.x), zeros(initial.reference), zeros(initial.y)}};
+    Parameters zero = *this;
+    zero.gains = {};
+    zero.rbf.width = zero.rbf.W_max = 0.0;
+    zero.graph = CommunicationGraph(shape.players);
+    for (GameFamily* family : zero.families()) family->coefficients.set_all_to_zero();
+    for (std::vector<Real>* values : {&zero.rbf.centers, &zero.initial.x, &zero.initial.reference, &zero.initial.y}) {
+      values->assign(values->size(), 0.0);
+    }
+    return zero;
   }
 
   /// Rebuilds what is derived from coefficients; called after any of them changed.
   void refresh() {
     graph.refresh();
-    cost->refresh();
+    for (GameFamily* family : families()) family->refresh();
   }
 };
 

@@ -132,7 +132,7 @@ toml::table parse_toml(std::string_view text) {
   }
 }
 
-void TomlEntry::accept_keys(std::initializer_list<std::string_view> known) const {
+void TomlEntry::accept_keys(std::span<const std::string_view> known) const {
   if (!present()) return;
   if (!node_->is_table()) fail("a table");
   for (const auto& [key, value] : *node_->as_table()) {
@@ -140,7 +140,7 @@ void TomlEntry::accept_keys(std::initializer_list<std::string_view> known) const
     if (std::find(known.begin(), known.end(), name) != known.end()) continue;
     const std::string shown = readable(name);
     const auto distance = [&](std::string_view other) { return edit_distance(shown, other); };
-    const auto* closest = std::min_element(
+    const auto closest = std::min_element(
         known.begin(), known.end(), [&](std::string_view a, std::string_view b) { return distance(a) < distance(b); });
     std::string expected;
     if (distance(*closest) <= std::max<std::size_t>(shown.size() / 3, shown.size() < 4 ? 0 : 2)) {

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <initializer_list>
+#include <span>
 #include <string>
 #include <string_view>
 
@@ -28,7 +29,8 @@ class TomlEntry {
   [[nodiscard]] const std::string& path() const { return path_; }
 
   /// Refuses every key of this table that is not known; an absent table has none.
-  void accept_keys(std::initializer_list<std::string_view> known) const;
+  void accept_keys(std::span<const std::string_view> known) const;
+  void accept_keys(std::initializer_list<std::string_view> known) const { accept_keys(std::span(known)); }
   /// An entry of this table, which may be absent; an absent table has only absent entries.
   [[nodiscard]] TomlEntry operator[](std::string_view key) const;
 

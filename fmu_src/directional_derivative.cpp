@@ -7,43 +7,35 @@
 namespace mixed_order_game {
 
 DirectionalDerivative::DirectionalDerivative(const Model& model, const ClosedLoop& loop)
-    : model_(&model),
-      loop_(&loop),
-      tangent_(loop),
-      d_ext_(at(loop.shape().actions())),
-      x_star_(at(loop.shape().actions())) {}
+    : model_(&model), loop_(&loop), tangent_(loop), x_star_(at(loop.shape().actions())) {}
 
 Tangent DirectionalDerivative::along(const Changes& changes, Equations equations, const View& view,
-                                     const LoopJacobian& jacobian) {
-  if (equations == Equations::initial) {
-    follow_parameters(changes, view, jacobian);
-  } else {
-    follow_states(changes, jacobian);
-  }
-  std::fill(d_ext_.begin(), d_ext_.end(), 0.0);
+                                     const Standing& standing) {
+  const ModelVariables& variables = model_->variables;
+  tangent_.clear();
+  std::fill(x_star_.begin(), x_star_.end(), 0.0);
   for (std::size_t k = 0; k < changes.references.size(); ++k) {
     const auto reference = static_cast<int>(changes.references[k]);
-    const Causality causality = model_->variables.family(reference).causality;
-    if (causality == Causality::input) d_ext_[at(model_->variables.variable(reference).slot)] += changes.values[k];
-    if (causality == Causality::independent) tangent_.add_time(view.time, changes.values[k]);
+    const Family& family = variables.family(reference);
+    const int slot = variables.variable(reference).slot;
+    if (family.state >= 0) tangent_.state[at(family.state + slot)] += changes.values[k];
+    if (family.causality == Causality::input) tangent_.d_ext[at(slot)] += changes.values[k];
+    if (family.causality == Causality::independent) tangent_.time += changes.values[k];
   }
-  tangent_.add_input(d_ext_.data());
+  if (equations == Equations::running) {
+    tangent_.follow(standing.time, standing.state, *standing.modes);
+    return tangent();
+  }
+  const Parameters direction = parameters_along(changes);
+  tangent_.follow_parameters(direction, standing.time, standing.state, *standing.modes);
+  if (view.x_star != nullptr) {
+    x_star_ = nash_equilibrium_along(*loop_->parameters().cost, *direction.cost, loop_->shape(), view.x_star);
+  }
   return tangent();
 }
 
-void DirectionalDerivative::follow_states(const Changes& changes, const LoopJacobian& jacobian) {
-  std::fill(tangent_.state.begin(), tangent_.state.end(), 0.0);
-  for (std::size_t k = 0; k < changes.references.size(); ++k) {
-    const auto reference = static_cast<int>(changes.references[k]);
-    const int state = model_->variables.family(reference).state;
-    if (state >= 0) tangent_.state[at(state + model_->variables.variable(reference).slot)] += changes.values[k];
-  }
-  tangent_.follow_state(jacobian);
-  std::fill(x_star_.begin(), x_star_.end(), 0.0);
-}
-
 // A direction in the space of parameters has the form of the parameters: the table writes it as it writes them.
-void DirectionalDerivative::follow_parameters(const Changes& changes, const View& view, const LoopJacobian& jacobian) {
+Parameters DirectionalDerivative::parameters_along(const Changes& changes) const {
   Settings direction(model_->game);
   direction.parameters = loop_->parameters().zero_direction();
   View written;
@@ -56,16 +48,13 @@ void DirectionalDerivative::follow_parameters(const Changes& changes, const View
     family.write(direction, model_->variables.variable(reference).slot, before + changes.values[k]);
   }
   direction.parameters.refresh();
-  tangent_.follow_parameters(jacobian, direction.parameters, view.time, view.state, *view.signals);
-  if (view.x_star != nullptr) {
-    x_star_ =
-        nash_equilibrium_along(*loop_->parameters().cost, *direction.parameters.cost, loop_->shape(), view.x_star);
-  }
+  return direction.parameters;
 }
 
-Tangent DirectionalDerivative::along_run(const View& view, const LoopJacobian& jacobian) {
+Tangent DirectionalDerivative::along_run(const View& view, const Standing& standing) {
+  tangent_.clear();
   std::copy_n(view.rate, tangent_.state.size(), tangent_.state.begin());
-  tangent_.follow_state(jacobian);
+  tangent_.follow(standing.time, standing.state, *standing.modes);
   std::fill(x_star_.begin(), x_star_.end(), 0.0);
   return tangent();
 }

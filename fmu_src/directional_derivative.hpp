@@ -4,7 +4,8 @@
 #include <cstdint>
 #include <span>
 
-#include "loop_tangent.hpp"
+#include "evaluation.hpp"
+#include "loop/loop_tangent.hpp"
 #include "unknowns.hpp"
 
 namespace mixed_order_game {
@@ -20,21 +21,18 @@ class DirectionalDerivative {
   /// Both must outlive it.
   DirectionalDerivative(const Model& model, const ClosedLoop& loop);
 
-  /// Along changes of known variables, at the point where the loop was evaluated and linearized. Tangents are valid
-  /// until the next call.
-  Tangent along(const Changes& changes, Equations equations, const View& view, const LoopJacobian& jacobian);
+  /// Along changes of known variables, where the run stands. Tangents are valid until the next call.
+  Tangent along(const Changes& changes, Equations equations, const View& view, const Standing& standing);
   /// Along the run itself: per unit of time, with all inputs at rest.
-  Tangent along_run(const View& view, const LoopJacobian& jacobian);
+  Tangent along_run(const View& view, const Standing& standing);
 
  private:
-  void follow_states(const Changes& changes, const LoopJacobian& jacobian);
-  void follow_parameters(const Changes& changes, const View& view, const LoopJacobian& jacobian);
+  [[nodiscard]] Parameters parameters_along(const Changes& changes) const;
   [[nodiscard]] Tangent tangent() const;
 
   const Model* model_;
   const ClosedLoop* loop_;
   LoopTangent tangent_;
-  std::vector<Real> d_ext_;
   std::vector<Real> x_star_;
 };
 

@@ -11,7 +11,6 @@ Evaluation::Evaluation(const Game& game)
       input_(game.parameters.shape.actions()),
       signals_(loop_.shape()),
       rate_(at(loop_.layout().size())),
-      jacobian_(loop_),
       d_ext_(at(loop_.shape().actions())),
       d_ext_as_set_(at(loop_.shape().actions())) {}
 
@@ -57,15 +56,6 @@ void Evaluation::prepare_signals(const Standing& standing) {
 // Of the signals it writes those of seeking only, which prepare_signals finds for the same state.
 void Evaluation::event_indicators(const Standing& standing, Real* values) {
   loop_.event_functions(standing.state, *standing.modes, signals_, values);
-}
-
-const LoopJacobian& Evaluation::linearize(const Standing& standing) {
-  if (!linearized_) {
-    jacobian_.refresh();
-    jacobian_.linearize(standing.state, signals_, *standing.modes);
-    linearized_ = true;
-  }
-  return jacobian_;
 }
 
 void Evaluation::prepare_equilibrium(Settings& settings) {

@@ -3,7 +3,6 @@
 
 #include "closed_loop.hpp"
 #include "external_disturbance.hpp"
-#include "loop_jacobian.hpp"
 #include "settings.hpp"
 
 namespace mixed_order_game {
@@ -28,15 +27,13 @@ class Evaluation {
   void act(const Settings& settings);
   void act(const ExternalDisturbance& input);
   /// The run stands somewhere else, or goes on from another run.
-  void moved() { signals_valid_ = linearized_ = false; }
+  void moved() { signals_valid_ = false; }
   /// The costs, whose equilibrium is asked for, are others.
   void costs_changed() { equilibrium_valid_ = false; }
 
   /// Computes what the variables of a stage need.
   void prepare(Stage stage, Settings& settings, const Standing& standing);
   void prepare_signals(const Standing& standing);
-  /// The loop's Jacobian, after prepare_signals.
-  const LoopJacobian& linearize(const Standing& standing);
   /// One for each weight column, as ClosedLoop::event_functions.
   void event_indicators(const Standing& standing, Real* values);
   /// Throws GameError when the game has no unique equilibrium.
@@ -52,11 +49,9 @@ class Evaluation {
   ExternalDisturbance input_;
 
   bool signals_valid_ = false;
-  bool linearized_ = false;
   bool equilibrium_valid_ = false;
   Signals signals_;
   AlignedVector rate_;
-  LoopJacobian jacobian_;
   AlignedVector d_ext_;  // that acts
   AlignedVector d_ext_as_set_;
   std::vector<Real> x_star_;

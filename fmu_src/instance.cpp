@@ -276,7 +276,7 @@ void Instance::get_output_derivatives(std::span<const std::uint32_t> references,
     }
   }
   const View source = prepare_tangent(references);
-  const Tangent tangent = directional_derivative_.along_run(source, evaluation_.linearize(standing()));
+  const Tangent tangent = directional_derivative_.along_run(source, standing());
   read_along(references, source, tangent, values);
 }
 
@@ -298,7 +298,7 @@ void Instance::get_directional_derivative(std::span<const std::uint32_t> unknown
   }
   const View source = prepare_tangent(unknowns);
   const Tangent tangent =
-      directional_derivative_.along({knowns, changes}, equations, source, evaluation_.linearize(standing()));
+      directional_derivative_.along({knowns, changes}, equations, source, standing());
   read_along(unknowns, source, tangent, derivatives);
 }
 

@@ -32,16 +32,6 @@ constexpr Unit known_units[] = {{"1", 0, 0},     {"s", 1, 0},     {"1/s", -1, 0}
 
 constexpr Real no_tolerance_above = 0.1;
 
-const QuadraticCost& cost_in(const View& view) {
-  return static_cast<const QuadraticCost&>(*view.settings->parameters.cost);
-}
-const PolynomialDynamics& dynamics_in(const View& view) {
-  return static_cast<const PolynomialDynamics&>(*view.settings->parameters.dynamics);
-}
-const SinusoidalDisturbance& disturbance_in(const View& view) {
-  return static_cast<const SinusoidalDisturbance&>(*view.settings->parameters.disturbance);
-}
-
 // Accessors made from members, so that reading and setting name the same one.
 template <auto Member>
 Real read_gain(const View& view, int) {
@@ -50,22 +40,6 @@ Real read_gain(const View& view, int) {
 template <auto Member>
 void write_gain(Settings& settings, int, Real value) {
   settings.parameters.gains.*Member = value;
-}
-template <auto Member>
-Real read_cost(const View& view, int slot) {
-  return (cost_in(view).*Member)[at(slot)];
-}
-template <auto Member>
-void write_cost(Settings& settings, int slot, Real value) {
-  (cost_of(settings.parameters).*Member)[at(slot)] = value;
-}
-template <auto Member>
-Real read_disturbance(const View& view, int slot) {
-  return (disturbance_in(view).*Member)[at(slot)];
-}
-template <auto Member>
-void write_disturbance(Settings& settings, int slot, Real value) {
-  (disturbance_of(settings.parameters).*Member)[at(slot)] = value;
 }
 template <auto Member>
 Real read_initial(const View& view, int slot) {
@@ -165,8 +139,7 @@ class ModelVariables::Builder {
     add_gains();
     add_network();
     add_graph();
-    add_costs();
-    add_perturbations();
+    add_coefficients();
     add_switches();
     add_initial_state();
     add_tolerances();
@@ -222,7 +195,7 @@ class ModelVariables::Builder {
     const int number = static_cast<int>(table_.families_.size());
     for (const auto& [slot, index] : elements) {
       const int state = family.state >= 0 ? family.state + slot : -1;
-      table_.variables_.push_back({number, slot, index, family.type, family.stage, state, family.signal, family.read});
+      table_.variables_.push_back({number, slot, index, family.type, family.stage, state, family.signal});
     }
     table_.families_.push_back(std::move(family));
   }
@@ -248,24 +221,54 @@ class ModelVariables::Builder {
     family.write = write_gain<Member>;
     add(std::move(family), one());
   }
-  template <auto Member>
-  void add_cost(const char* name, const char* description, const Elements& elements) {
-    Family family = parameter(name, description, Variability::tunable);
-    family.declared_type = "CostCoefficient";
-    family.unit = {"1", "1"};
-    family.moves_equilibrium = true;
-    family.read = read_cost<Member>;
-    family.write = write_cost<Member>;
-    add(std::move(family), elements);
+  // What the families of the game declare.
+  void add_coefficients() {
+    const auto families = game_.parameters.families();
+    for (std::size_t number = 0; number < families.size(); ++number) {
+      const std::span<const Coefficient> declared = families[number]->coefficients.declared();
+      for (int k = 0; k < static_cast<int>(declared.size()); ++k) {
+        if (declared[at(k)].variable != nullptr) add_coefficient(number, k, declared[at(k)]);
+      }
+    }
   }
-  template <auto Member>
-  void add_disturbance(const char* name, const char* description, const char* type, std::array<const char*, 2> unit) {
-    Family family = parameter(name, description, Variability::tunable);
-    family.declared_type = type;
-    family.unit = unit;
-    family.read = read_disturbance<Member>;
-    family.write = write_disturbance<Member>;
-    add(std::move(family), actions());
+  void add_coefficient(std::size_t game_family, int number, const Coefficient& declared) {
+    Family family = parameter(declared.variable, declared.description, Variability::tunable);
+    family.declared_type = declared.declared_type;
+    family.unit = declared.unit;
+    family.moves_equilibrium = declared.moves_equilibrium;
+    family.read = [=](const View& view, int slot) {
+      return view.settings->parameters.families()[game_family]->coefficients[number][at(slot)];
+    };
+    family.write = [=](Settings& settings, int slot, Real value) {
+      settings.parameters.families()[game_family]->coefficients[number][at(slot)] = value;
+    };
+    family.game_family = static_cast<int>(game_family);
+    family.coefficient = number;
+    add(std::move(family), elements(declared.indices, game_.parameters.families()[game_family]->coefficients[number]));
+  }
+  Elements elements(Indices indices, const std::vector<Real>& values) const {
+    switch (indices) {
+      case Indices::player:
+        return players();
+      case Indices::entry:
+        return actions();
+      case Indices::pair:
+        return pairs(values);
+      case Indices::term:
+        break;
+    }
+    return {};
+  }
+  // [i,j], i != j; where not everything is exposed, those that are not zero
+  Elements pairs(const std::vector<Real>& values) const {
+    Elements elements;
+    for (int i = 0; i < shape_.players; ++i) {
+      for (int j = 0; j < shape_.players; ++j) {
+        const int slot = i * shape_.players + j;
+        if (i != j && (everything() || values[at(slot)] != 0.0)) elements.push_back({slot, {i + 1, j + 1}});
+      }
+    }
+    return elements;
   }
   template <auto Member>
   void add_initial(const char* name, const char* description, const char* type, const char* unit,
@@ -335,34 +338,6 @@ class ModelVariables::Builder {
       }
     }
     add(std::move(family), pairs);
-  }
-
-  void add_costs() {
-    const auto& cost = static_cast<const QuadraticCost&>(*game_.parameters.cost);
-    Elements pairs;
-    for (int i = 0; i < shape_.players; ++i) {
-      for (int j = 0; j < shape_.players; ++j) {
-        const int slot = i * shape_.players + j;
-        if (i == j || (!everything() && cost.coupling[at(slot)] == 0.0)) continue;
-        pairs.push_back({slot, {i + 1, j + 1}});
-      }
-    }
-    add_cost<&QuadraticCost::quadratic>("cost_quadratic", "Coefficient of |x_i|^2 in f_i", players());
-    add_cost<&QuadraticCost::linear>("cost_linear", "Coefficient of x_il in f_i", actions());
-    add_cost<&QuadraticCost::coupling>("cost_coupling", "Coefficient of |x_i - x_j|^2 in f_i", pairs);
-  }
-
-  void add_perturbations() {
-    Family gain = parameter("dynamics_gain", "Scales the unknown dynamics g_i", Variability::tunable);
-    gain.unit = {"1", "1"};
-    gain.read = [](const View& view, int i) { return dynamics_in(view).gain[at(i)]; };
-    gain.write = [](Settings& settings, int i, Real value) { dynamics_of(settings.parameters).gain[at(i)] = value; };
-    add(std::move(gain), players());
-    add_disturbance<&SinusoidalDisturbance::amplitude>("disturbance_amplitude", "Amplitude of d_il(t)", "Drive", drive);
-    add_disturbance<&SinusoidalDisturbance::frequency>("disturbance_frequency", "Angular frequency of d_il(t)",
-                                                       "AngularFrequency", {"rad/s", "rad/s"});
-    add_disturbance<&SinusoidalDisturbance::phase>("disturbance_phase", "Phase of d_il(t)", "Phase", {"rad", "rad"});
-    add_disturbance<&SinusoidalDisturbance::bias>("disturbance_bias", "Mean of d_il(t)", "Drive", drive);
   }
 
   void add_switches() {
@@ -595,7 +570,7 @@ class ModelVariables::Builder {
   }
 
   void add_solver() {
-    const auto add_count = [&](const char* name, const char* description, Real (*read)(const View&, int)) {
+    const auto add_count = [&](const char* name, const char* description, auto read) {
       add({.name = name,
            .description = description,
            .type = Type::integer,

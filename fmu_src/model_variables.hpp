@@ -6,6 +6,7 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <span>
 #include <string>
@@ -63,12 +64,15 @@ struct Family {
 
   /// Value of the element at a slot, of other families than states and signals; Integer and Boolean values are exact
   /// in a Real.
-  Real (*read)(const View& view, int slot) = nullptr;
-  /// Null when it cannot be set.
-  void (*write)(Settings& settings, int slot, Real value) = nullptr;
+  std::function<Real(const View& view, int slot)> read = nullptr;
+  /// Empty when it cannot be set.
+  std::function<void(Settings& settings, int slot, Real value)> write = nullptr;
 
-  /// Change of the element at a slot along a tangent; null unless the equations of the model determine it.
-  Real (*read_along)(const View& view, const Tangent& tangent, int slot) = nullptr;
+  /// Change of the element at a slot along a tangent; empty unless the equations of the model determine it.
+  std::function<Real(const View& view, const Tangent& tangent, int slot)> read_along = nullptr;
+
+  int game_family = -1;  ///< of coefficients: which of Parameters::families() declares it
+  int coefficient = -1;  ///< and its number there
 
   int first = 0;  ///< value references first .. first + count - 1
   int count = 0;
@@ -83,7 +87,6 @@ struct Variable {
   Stage stage = Stage::settings;
   int state = -1;  ///< position in the state vector
   AlignedVector Signals::* signal = nullptr;
-  Real (*read)(const View& view, int slot) = nullptr;
 };
 
 class ModelVariables {
@@ -108,7 +111,7 @@ class ModelVariables {
     const Variable& one = variable(reference);
     if (one.state >= 0) return view.state[one.state];
     if (one.signal != nullptr) return (view.signals->*one.signal)[at(one.slot)];
-    return one.read(view, one.slot);
+    return families_[at(one.family)].read(view, one.slot);
   }
 
   /// All settings as numbers, in the order of the table, followed by the input polynomials.

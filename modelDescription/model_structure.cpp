@@ -1,257 +1,252 @@
+// The equations of the loop, evaluated with what values depend on instead of numbers: after initialization, where
+// states, inputs and time are known, and in initialization mode, where parameters are known in place of states.
 #include "model_structure.hpp"
 
 #include <algorithm>
-#include <map>
 #include <string>
 #include <unordered_map>
 
+#include "loop/equations.hpp"
 #include "unknowns.hpp"
 
 namespace mixed_order_game {
 
 namespace {
 
-using enum DependencyKind;
-
-class Analysis {
+/// Variables by family and slot, and what they are where they count as known.
+class Knowns {
  public:
-  explicit Analysis(const Model& model)
-      : model_(model),
-        variables_(model.variables),
-        parameters_(model.game.parameters),
-        shape_(parameters_.shape),
-        n_(shape_.actions()) {
-    for (int reference = 0; reference < variables_.size(); ++reference) {
-      references_[variables_.family(reference).name][variables_.variable(reference).slot] = reference;
+  Knowns(const ModelVariables& variables, Equations equations) : equations_(equations) {
+    for (int reference = 0; reference < variables.size(); ++reference) {
+      const Family& family = variables.family(reference);
+      const int slot = variables.variable(reference).slot;
+      references_[family.name][slot] = reference;
+      if (family.game_family >= 0) coefficients_[family.game_family][family.coefficient] = &references_[family.name];
     }
-    states_are_variables_ = model.game.expose == Expose::all;
   }
 
-  ModelStructure result() {
-    ModelStructure structure;
-    for (int reference = 0; reference < variables_.size(); ++reference) {
-      const Family& family = variables_.family(reference);
-      const std::string& name = family.name;
-      const int slot = variables_.variable(reference).slot;
-      if (family.causality == Causality::output) {
-        structure.outputs.push_back(unknown(reference, [&] { output(name, slot); }));
-      }
-      if (is_unknown(model_, reference, Equations::initial)) {
-        structure.initial_unknowns.push_back(unknown(reference, [&] { initial_value(name, slot); }));
-      }
-    }
-    if (!states_are_variables_) return structure;
-    for (int p = 0; p < n_; ++p) add_derivative(structure, "der(x", p);
-    for (int p = 0; p < n_; ++p) add_derivative(structure, is_second(p) ? "der(v" : "der(z", p);
-    for (int k = 0; k < shape_.players * n_; ++k) add_derivative(structure, "der(y", k);
-    for (int k = 0; k < shape_.neurons * n_; ++k) add_derivative(structure, "der(W", k);
-    return structure;
+  /// A parameter; where it is no variable of this game, its number stays.
+  [[nodiscard]] Dependencies parameter(const std::string& family, int slot, Real number) const {
+    const auto found = references_.find(family);
+    return found == references_.end() ? Dependencies(number) : parameter(found->second, slot, number);
+  }
+  [[nodiscard]] Dependencies coefficient(int game_family, int number, int slot, Real value) const {
+    const auto family = coefficients_.find(game_family);
+    if (family == coefficients_.end()) return value;
+    const auto found = family->second.find(number);
+    return found == family->second.end() ? Dependencies(value) : parameter(*found->second, slot, value);
+  }
+  [[nodiscard]] Dependencies input(int slot) const { return Dependencies::known(references_.at("d_ext").at(slot)); }
+  [[nodiscard]] Dependencies time() const { return Dependencies::known(references_.at("time").at(0)); }
+
+ private:
+  using Slots = std::unordered_map<int, int>;
+
+  [[nodiscard]] Dependencies parameter(const Slots& slots, int slot, Real number) const {
+    const auto found = slots.find(slot);
+    if (found == slots.end()) return number;
+    return equations_ == Equations::initial ? Dependencies::known(found->second) : Dependencies::unknown();
+  }
+
+  Equations equations_;
+  std::unordered_map<std::string, Slots> references_;
+  std::unordered_map<int, std::unordered_map<int, const Slots*>> coefficients_;
+};
+
+class KnownCoefficients final : public CoefficientsAs<Dependencies> {
+ public:
+  KnownCoefficients(const Knowns& knowns, int game_family, const Coefficients& values)
+      : knowns_(knowns), game_family_(game_family), values_(values) {}
+
+  [[nodiscard]] Dependencies value(int number, int slot) const override {
+    return knowns_.coefficient(game_family_, number, slot, values_.value(number, slot));
+  }
+  [[nodiscard]] bool vanishes(int number, int slot) const override {
+    const Dependencies coefficient = value(number, slot);
+    return coefficient.number() == 0.0;
   }
 
  private:
-  bool is_second(int p) const { return shape_.is_second_order(shape_.player_of(p)); }
+  const Knowns& knowns_;
+  int game_family_;
+  const Coefficients& values_;
+};
 
-  template <typename Collect>
-  Unknown unknown(int reference, Collect collect) {
-    collected_.clear();
-    collect();
+/// What every unknown depends on.
+class Analysis {
+ public:
+  Analysis(const Model& model, Equations equations)
+      : model_(model),
+        parameters_(model.game.parameters),
+        shape_(parameters_.shape),
+        n_(shape_.actions()),
+        equations_(equations),
+        knowns_(model.variables, equations),
+        loop_(parameters_),
+        state_(at(loop_.layout.size())) {
+    fill_state();
+    const auto families = parameters_.families();
+    std::vector<KnownCoefficients> coefficients;
+    for (int k = 0; k < static_cast<int>(families.size()); ++k) {
+      coefficients.emplace_back(knowns_, k, families[at(k)]->coefficients);
+    }
+    const LoopNumbers<Dependencies> numbers = loop_numbers(coefficients);
+    loop_.evaluate_control(numbers, state_.data());
+    if (!model.variables.states().empty()) {
+      std::vector<Dependencies> d_ext;
+      for (int p = 0; p < n_; ++p) d_ext.push_back(knowns_.input(p));
+      rate_.resize(state_.size());
+      const Modes on_sphere(at(n_), 1);
+      loop_.evaluate_rates(numbers, knowns_.time(), state_.data(), d_ext.data(), on_sphere, rate_.data());
+    }
+    if (equations == Equations::initial) find_equilibrium(coefficients[0]);
+  }
+
+  Unknown unknown(int reference) const {
     Unknown result{reference, {}};
-    for (const auto& [known, kind] : collected_) result.dependencies.push_back({known, kind});
+    const Dependencies value = value_of(reference);
+    for (const auto& [known, kind] : value.on()) result.dependencies.push_back({known, kind});
     return result;
   }
-  void add_derivative(ModelStructure& structure, const char* name, int slot) {
-    structure.derivatives.push_back(unknown(references_.at(name).at(slot), [&] { derivative(name, slot); }));
+
+ private:
+  Dependencies value_of(int reference) const {
+    const ModelVariables& variables = model_.variables;
+    const Family& family = variables.family(reference);
+    const int slot = variables.variable(reference).slot;
+    if (family.state >= 0) return state_[at(family.state + slot)];
+    if (family.derivative_of >= 0) return rate_[at(variables.families()[at(family.derivative_of)].state + slot)];
+    if (family.signal == &Signals::control) return loop_.control[at(slot)];
+    if (family.causality == Causality::calculated_parameter) return equilibrium(slot);
+    // nash_error, of all actions and costs
+    Dependencies all;
+    for (int p = 0; p < n_; ++p) all += state_[at(loop_.layout.x() + p)].nonlinear();
+    for (const Dependencies& costs : own_costs_) all += costs;
+    return all;
   }
 
-  // A known that is no variable of this game (because it is not exposed) is left out, and false returned.
-  bool on(const std::string& name, int slot = 0, DependencyKind kind = dependent) {
-    const auto family = references_.find(name);
-    if (family == references_.end()) return false;
-    const auto reference = family->second.find(slot);
-    if (reference == family->second.end()) return false;
-    const auto [entry, is_new] = collected_.emplace(reference->second, kind);
-    if (!is_new) entry->second = std::max(entry->second, kind);
-    return true;
-  }
-  void on_state(const std::string& name, int slot, DependencyKind kind = dependent) {
-    if (states_are_variables_) on(name, slot, kind);
-  }
-  void on_reference_of(int p, DependencyKind kind = dependent) { on_state(is_second(p) ? "v" : "z", p, kind); }
-
-  void output(const std::string& name, int p) {
-    if (name == "x" || name == "v") {
-      on_state(name, p, constant);
-    } else if (name == "u") {
-      control(p);
-    } else {
-      for (int other = 0; other < n_; ++other) on_state("x", other);
+  void fill_state() {
+    const StateLayout& layout = loop_.layout;
+    const InitialState& initial = parameters_.initial;
+    if (equations_ == Equations::running) {
+      const std::vector<int>& references = model_.variables.states();
+      for (std::size_t k = 0; k < state_.size(); ++k) {
+        state_[k] = references.empty() ? Dependencies::unknown() : Dependencies::known(references[k]);
+      }
+      return;
+    }
+    for (int p = 0; p < n_; ++p) {
+      const char* reference = shape_.is_second_order(shape_.player_of(p)) ? "v0" : "z0";
+      state_[at(layout.x() + p)] = knowns_.parameter("x0", p, initial.x[at(p)]);
+      state_[at(layout.reference() + p)] = knowns_.parameter(reference, p, initial.reference[at(p)]);
+    }
+    for (int k = 0; k < shape_.players * n_; ++k) {
+      state_[at(layout.estimates() + k)] = knowns_.parameter("y0", k, initial.y[at(k)]);
     }
   }
 
-  void derivative(const std::string& name, int slot) {
-    const int p = slot % n_;
-    const int i = shape_.player_of(p);
-    if (name == "der(x" && is_second(p)) {
-      on_state("v", p, constant);
-    } else if (name == "der(x" || name == "der(v") {
-      control(p);
-      for_dynamics(p, [&](int other, DependencyKind kind) { on_state("x", other, kind); });
-      on("d_ext", p, constant);
-      on("time");
-    } else if (name == "der(z") {
-      for_row(p, [&](int other) { on_state("y", i * n_ + other, tunable); });
-    } else if (name == "der(y") {
-      for (int k = 0; k < shape_.players; ++k) on_state("y", k * n_ + p, tunable);
-      if (slot / n_ != i) on_state(is_second(p) ? "x" : "z", p, tunable);  // a_ii = 0
-    } else {
-      network(p);
-      error(p);
+  LoopNumbers<Dependencies> loop_numbers(const std::vector<KnownCoefficients>& coefficients) const {
+    const auto& [k1, k2, k3, k4, beta, delta, epsilon] = parameters_.gains;
+    const RbfNetwork& rbf = parameters_.rbf;
+    LoopNumbers<Dependencies> numbers;
+    numbers.k1 = knowns_.parameter("k1", 0, k1);
+    numbers.k2 = knowns_.parameter("k2", 0, k2);
+    numbers.k3 = knowns_.parameter("k3", 0, k3);
+    numbers.k4 = knowns_.parameter("k4", 0, k4);
+    numbers.beta = knowns_.parameter("beta", 0, beta);
+    numbers.delta = knowns_.parameter("delta", 0, delta);
+    numbers.epsilon = knowns_.parameter("epsilon", 0, epsilon);
+    numbers.robust = knowns_.parameter("robust", 0, 1.0);
+    numbers.perturbed = knowns_.parameter("perturbed", 0, 1.0);
+    numbers.width = knowns_.parameter("rho", 0, rbf.width);
+    numbers.W_max = knowns_.parameter("W_max", 0, rbf.W_max);
+    for (std::size_t m = 0; m < rbf.centers.size(); ++m) {
+      numbers.centers.push_back(knowns_.parameter("center", static_cast<int>(m), rbf.centers[m]));
     }
-  }
-
-  void error(int p) {
-    on_reference_of(p);
-    if (is_second(p)) {
-      for_row(p, [&](int other) { on_state("y", shape_.player_of(p) * n_ + other); });
-    } else {
-      on_state("x", p);
-    }
-  }
-  // w'S(y_i): the network sees the whole estimate
-  void network(int p) {
-    for (int other = 0; other < n_; ++other) on_state("y", shape_.player_of(p) * n_ + other);
-    for (int m = 0; m < shape_.neurons; ++m) on_state("W", m * n_ + p);
-  }
-  void control(int p) {
-    error(p);
-    network(p);
-  }
-
-  void initial_value(const std::string& name, int slot) {
-    const int p = slot % n_;
-    const int i = shape_.player_of(p);
-    if (name == "x" || name == "v" || name == "z" || name == "y") {
-      on(name + "0", slot);
-    } else if (name == "W") {  // starts at zero, whatever is set
-    } else if (name == "u") {
-      initial_control(p);
-    } else if (name == "nash_error") {
-      for (int other = 0; other < n_; ++other) on("x0", other);
-      for (int other = 0; other < n_; ++other) own_cost(other);
-    } else if (name == "x_star") {
-      equilibrium_of(p);
-    } else if (name == "der(x" && is_second(p)) {
-      on("v0", p);
-    } else if (name == "der(x" || name == "der(v") {
-      initial_control(p);
-      on("perturbed");
-      for_dynamics(p, [&](int other, DependencyKind) {
-        on("dynamics_gain", i);
-        on("x0", other);
-      });
-      for (const char* part : {"amplitude", "frequency", "phase", "bias"}) on("disturbance_" + std::string(part), p);
-      on("d_ext", p);
-      on("time");
-    } else if (name == "der(z") {
-      on("k2");
-      initial_gradient(p);
-    } else if (name == "der(y") {
-      const int estimator = slot / n_;
-      on("k3");
+    for (int i = 0; i < shape_.players; ++i) {
+      auto& row = numbers.edges.emplace_back();
       for (int k = 0; k < shape_.players; ++k) {
-        on("a", std::min(estimator, k) * shape_.players + std::max(estimator, k));
-        on("y0", k * n_ + p);
+        const Dependencies weight =
+            knowns_.parameter("a", std::min(i, k) * shape_.players + std::max(i, k), parameters_.graph.weight(i, k));
+        if (weight.number() != 0.0) row.push_back({k, weight});
       }
-      if (estimator != i) on(is_second(p) ? "x0" : "z0", p);  // a_ii = 0
-    } else if (name == "der(W") {
-      on("beta");
-      on("robust");
-      on("rho");
-      on("center", slot / n_);
-      for (int other = 0; other < n_; ++other) on("y0", i * n_ + other);
-      initial_error(p);
     }
+    numbers.cost = &coefficients[0];
+    numbers.dynamics = &coefficients[1];
+    numbers.disturbance = &coefficients[2];
+    return numbers;
   }
 
-  void initial_gradient(int p) {
-    const int i = shape_.player_of(p);
-    const Real* y0 = parameters_.initial.y.data() + i * n_;  // cannot be set where it is no variable
-    on("cost_linear", p);
-    if (states_are_variables_ || y0[p] != 0.0) on("cost_quadratic", i);
-    for (int j = 0; j < shape_.players; ++j) {
-      const int other = shape_.entry(j, shape_.coordinate_of(p));
-      if (states_are_variables_ || y0[p] != y0[other]) on("cost_coupling", i * shape_.players + j);
-      on("y0", i * n_ + other);
+  // What grad_il f_i depends on at an x of its own, whose entries count as known with references past all others.
+  void find_equilibrium(const KnownCoefficients& costs) {
+    const int first_entry = model_.variables.size();
+    std::vector<Dependencies> x;
+    for (int p = 0; p < n_; ++p) x.push_back(Dependencies::known(first_entry + p));
+    std::vector<Dependencies> gradients(at(n_));
+    parameters_.cost->own_gradients(costs, x.data(), 0, gradients.data());
+    for (const Dependencies& gradient : gradients) {
+      Dependencies& own = own_costs_.emplace_back();
+      std::vector<int>& entries = entries_of_gradient_.emplace_back();
+      for (const auto& [reference, kind] : gradient.on()) {
+        if (reference < first_entry) {
+          own += Dependencies::known(reference);
+        } else {
+          entries.push_back(reference - first_entry);
+        }
+      }
     }
   }
-  void initial_error(int p) {
-    if (is_second(p)) {
-      on("v0", p);
-      on("k2");
-      initial_gradient(p);
-    } else {
-      on("x0", p);
-      on("z0", p);
-    }
-  }
-  // the weights start at zero, so that the network says nothing yet
-  void initial_control(int p) {
-    on(is_second(p) ? "k4" : "k1");
-    on("delta");
-    on("epsilon");
-    on("robust");
-    initial_error(p);
-  }
-  // x*_il follows the costs of i and of the players that it is coupled to, directly or by way of others
-  void equilibrium_of(int p) {
+  // x*_p follows its own costs and those of the entries that its gradient depends on, directly or by way of others.
+  Dependencies equilibrium(int p) const {
     std::vector<int> found{p};
-    std::vector<bool> is_found(at(shape_.players));
-    is_found[at(shape_.player_of(p))] = true;
+    std::vector<bool> is_found(at(n_));
+    is_found[at(p)] = true;
+    Dependencies costs;
     for (std::size_t next = 0; next < found.size(); ++next) {
-      for (const int j : own_cost(found[next])) {
-        if (!is_found[at(j)]) found.push_back(shape_.entry(j, shape_.coordinate_of(p)));
-        is_found[at(j)] = true;
+      costs += own_costs_[at(found[next])];
+      for (const int entry : entries_of_gradient_[at(found[next])]) {
+        if (!is_found[at(entry)]) found.push_back(entry);
+        is_found[at(entry)] = true;
       }
     }
-  }
-  // coefficients of f_i along one coordinate; returns the players that i can be coupled to
-  std::vector<int> own_cost(int p) {
-    const int i = shape_.player_of(p);
-    std::vector<int> others;
-    on("cost_quadratic", i);
-    on("cost_linear", p);
-    for (int j = 0; j < shape_.players; ++j) {
-      if (on("cost_coupling", i * shape_.players + j)) others.push_back(j);
-    }
-    return others;
-  }
-
-  // all players' entries of the coordinate of p
-  template <typename Each>
-  void for_row(int p, Each each) const {
-    for (int j = 0; j < shape_.players; ++j) each(shape_.entry(j, shape_.coordinate_of(p)));
-  }
-  template <typename Each>
-  void for_dynamics(int p, Each each) const {
-    const UnknownDynamics& dynamics = *parameters_.dynamics;
-    const SparseRows& pattern = dynamics.jacobian_pattern();
-    for (int k = pattern.start[at(p)]; k < pattern.start[at(p + 1)]; ++k) {
-      each(pattern.column[at(k)], dynamics.is_constant(k) ? tunable : dependent);
-    }
+    return costs;
   }
 
   const Model& model_;
-  const ModelVariables& variables_;
   const Parameters& parameters_;
   const Shape& shape_;
   int n_;
-  std::unordered_map<std::string, std::unordered_map<int, int>> references_;  // by family and slot
-  bool states_are_variables_ = false;
-  std::map<int, DependencyKind> collected_;
+  Equations equations_;
+  Knowns knowns_;
+  LoopEquations<Dependencies> loop_;
+  std::vector<Dependencies> state_, rate_;
+  std::vector<Dependencies> own_costs_;  // by entry of a gradient
+  std::vector<std::vector<int>> entries_of_gradient_;
 };
 
 }  // namespace
 
-ModelStructure model_structure(const Model& model) { return Analysis(model).result(); }
+ModelStructure model_structure(const Model& model) {
+  const ModelVariables& variables = model.variables;
+  const Analysis running(model, Equations::running);
+  const Analysis initial(model, Equations::initial);
+  ModelStructure structure;
+  for (int reference = 0; reference < variables.size(); ++reference) {
+    const Family& family = variables.family(reference);
+    if (family.causality == Causality::output) structure.outputs.push_back(running.unknown(reference));
+    if (is_unknown(model, reference, Equations::initial)) {
+      structure.initial_unknowns.push_back(initial.unknown(reference));
+    }
+  }
+  // in the order of the state vector
+  std::vector<int> derivatives(variables.states().size());
+  for (int reference = 0; reference < variables.size(); ++reference) {
+    const int of = variables.family(reference).derivative_of;
+    if (of < 0) continue;
+    derivatives[at(variables.families()[at(of)].state + variables.variable(reference).slot)] = reference;
+  }
+  for (const int reference : derivatives) structure.derivatives.push_back(running.unknown(reference));
+  return structure;
+}
 
 }  // namespace mixed_order_game

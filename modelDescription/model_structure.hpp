@@ -3,12 +3,10 @@
 
 #include <vector>
 
+#include "loop/dependencies.hpp"
 #include "model.hpp"
 
 namespace mixed_order_game {
-
-/// How a known variable enters: by a constant factor, by a factor made of tunable parameters, or in any way.
-enum class DependencyKind { constant, tunable, dependent };
 
 struct Dependency {
   int reference;  ///< of the known variable

@@ -1,30 +1,31 @@
 // f_i(x) = q_i |x_i|^2 + l_i . x_i + const_i + sum_j c_ij |x_i - x_j|^2, the family of the paper's example.
 #pragma once
 
-#include "cost.hpp"
+#include "families/cost.hpp"
 
 namespace mixed_order_game {
 
 class QuadraticCost final : public Cost {
  public:
+  enum Number { quadratic, linear, constant, coupling };  ///< q_i, l_il, const_i, c_ij
+
   QuadraticCost(int players, int dimension);
 
-  /// Coefficients; call refresh() after changing any.
-  std::vector<Real> quadratic;  ///< q_i at i
-  std::vector<Real> linear;     ///< l_il at l * N + i
-  std::vector<Real> constant;   ///< const_i at i
-  std::vector<Real> coupling;   ///< c_ij at i * N + j, zero diagonal
-
   [[nodiscard]] std::unique_ptr<Cost> clone() const override;
+  void refresh() override;
   [[nodiscard]] Real value(int i, const Real* x) const override;
   void own_gradients(const Real* points, int stride, Real* gradient) const override;
+  void own_gradients(const CoefficientsAs<Dual>& along, const Dual* points, int stride, Dual* gradient) const override;
+  void own_gradients(const CoefficientsAs<Dependencies>& of, const Dependencies* points, int stride,
+                     Dependencies* gradient) const override;
   [[nodiscard]] const SparseRows& hessian_pattern() const override { return pattern_; }
   void hessian_rows(const Real* points, int stride, Real* values) const override;
-  [[nodiscard]] std::unique_ptr<Cost> zero_direction() const override;
-  void own_gradients_along(const Cost& direction, const Real* points, int stride, Real* derivative) const override;
-  void refresh() override;
 
  private:
+  template <typename Scalar>
+  void own_gradients_as(const CoefficientsAs<Scalar>& coefficients, const Scalar* points, int stride,
+                        Scalar* gradient) const;
+
   int players_;
   int dimension_;
   SparseRows neighbours_;             // row i: the j with c_ij != 0

@@ -4,14 +4,16 @@
 
 #include <memory>
 
-#include "sparse_rows.hpp"
-#include "types.hpp"
+#include "families/game_family.hpp"
+#include "families/sparse_rows.hpp"
+#include "loop/dependencies.hpp"
+#include "loop/dual.hpp"
 
 namespace mixed_order_game {
 
-class Cost {
+class Cost : public GameFamily {
  public:
-  virtual ~Cost() = default;
+  using GameFamily::GameFamily;
   [[nodiscard]] virtual std::unique_ptr<Cost> clone() const = 0;
 
   /// f_i(x) for a joint action x of length N D.
@@ -20,21 +22,16 @@ class Cost {
   /// gradient[entry(i, l)] = d f_i / d x_il at the joint action points + i * stride, for every player i.
   /// A stride of N D evaluates each player at its own estimate y_i, a stride of 0 all players at one x.
   virtual void own_gradients(const Real* points, int stride, Real* gradient) const = 0;
+  virtual void own_gradients(const CoefficientsAs<Dual>& coefficients, const Dual* points, int stride,
+                             Dual* gradient) const = 0;
+  virtual void own_gradients(const CoefficientsAs<Dependencies>& coefficients, const Dependencies* points, int stride,
+                             Dependencies* gradient) const = 0;
 
   /// Row entry(i, l): the columns entry(j, h) at which d^2 f_i / (d x_il d x_jh) may differ from zero.
   [[nodiscard]] virtual const SparseRows& hessian_pattern() const = 0;
 
   /// The entries of hessian_pattern(), row entry(i, l) at the joint action points + i * stride.
   virtual void hessian_rows(const Real* points, int stride, Real* values) const = 0;
-
-  /// The same family with every coefficient zero, for the coefficients of a direction.
-  [[nodiscard]] virtual std::unique_ptr<Cost> zero_direction() const = 0;
-
-  /// The derivative of own_gradients() with respect to the coefficients, along those of a direction.
-  virtual void own_gradients_along(const Cost& direction, const Real* points, int stride, Real* derivative) const = 0;
-
-  /// Rebuilds what was derived from coefficients; called after any of them changed.
-  virtual void refresh() = 0;
 };
 
 }  // namespace mixed_order_game

@@ -1,0 +1,24 @@
+// External disturbances d_i(t) of the plants, as the closed loop sees them.
+#pragma once
+
+#include <memory>
+
+#include "families/game_family.hpp"
+#include "loop/dependencies.hpp"
+#include "loop/dual.hpp"
+
+namespace mixed_order_game {
+
+class Disturbance : public GameFamily {
+ public:
+  using GameFamily::GameFamily;
+  [[nodiscard]] virtual std::unique_ptr<Disturbance> clone() const = 0;
+
+  /// d[entry(i, l)] = d_il(t); t in seconds.
+  virtual void values(Real t, Real* d) const = 0;
+  virtual void values(const CoefficientsAs<Dual>& coefficients, const Dual& t, Dual* d) const = 0;
+  virtual void values(const CoefficientsAs<Dependencies>& coefficients, const Dependencies& t,
+                      Dependencies* d) const = 0;
+};
+
+}  // namespace mixed_order_game

@@ -1,0 +1,84 @@
+#include "families/polynomial_dynamics.hpp"
+
+#include <map>
+
+namespace mixed_order_game {
+
+namespace {
+
+constexpr Coefficient declared[] = {
+    {.key = "linear", .symbol = "coefficients", .indices = Indices::term},
+    {.key = "square", .symbol = "coefficients", .indices = Indices::term},
+    {.variable = "dynamics_gain",
+     .description = "Scales the unknown dynamics g_i",
+     .indices = Indices::player,
+     .unit = {"1", "1"},
+     .start = 1.0},
+};
+
+}  // namespace
+
+PolynomialDynamics::PolynomialDynamics(int players, int dimension)
+    : UnknownDynamics(Coefficients(declared, players, dimension)), players_(players) {
+  pattern_.start.assign(at(players * dimension + 1), 0);
+}
+
+std::unique_ptr<UnknownDynamics> PolynomialDynamics::clone() const {
+  return std::make_unique<PolynomialDynamics>(*this);
+}
+
+void PolynomialDynamics::refresh() {
+  if (pattern_.entries() != 0) return;  // the game file fixes the terms
+  std::map<int, std::pair<Real, Real>> terms;  // G and H by slot entry(i, l) N + j
+  for (const auto& [slot, value] : coefficients.terms(linear)) terms[slot].first = value;
+  for (const auto& [slot, value] : coefficients.terms(square)) terms[slot].second = value;
+  std::erase_if(terms, [](const auto& term) { return term.second.first == 0.0 && term.second.second == 0.0; });
+  const int rows = pattern_.rows();
+  pattern_ = {};
+  linear_.clear();
+  square_.clear();
+  auto term = terms.begin();
+  for (int row = 0; row < rows; ++row) {
+    for (; term != terms.end() && term->first / players_ == row; ++term) {
+      pattern_.column.push_back(row / players_ * players_ + term->first % players_);
+      linear_.push_back(term->second.first);
+      square_.push_back(term->second.second);
+    }
+    pattern_.start.push_back(pattern_.entries());
+  }
+}
+
+template <typename Scalar, typename Gain>
+void PolynomialDynamics::values_as(const Scalar* x, Gain gain_of, Scalar* g) const {
+  for (int row = 0; row < pattern_.rows(); ++row) {
+    Scalar sum = 0.0;
+    for (int k = pattern_.start[at(row)]; k < pattern_.start[at(row + 1)]; ++k) {
+      const Scalar& xj = x[pattern_.column[at(k)]];
+      sum += (linear_[at(k)] + square_[at(k)] * xj) * xj;  // G x_jl + H x_jl^2
+    }
+    g[row] = gain_of(row % players_) * sum;
+  }
+}
+
+void PolynomialDynamics::values(const Real* x, Real* g) const {
+  values_as(x, [&](int i) { return coefficients[gain][at(i)]; }, g);
+}
+
+void PolynomialDynamics::values(const CoefficientsAs<Dual>& along, const Dual* x, Dual* g) const {
+  values_as(x, [&](int i) { return along.value(gain, i); }, g);
+}
+
+void PolynomialDynamics::values(const CoefficientsAs<Dependencies>& of, const Dependencies* x, Dependencies* g) const {
+  values_as(x, [&](int i) { return of.value(gain, i); }, g);
+}
+
+void PolynomialDynamics::jacobian(const Real* x, Real* values) const {
+  for (int row = 0; row < pattern_.rows(); ++row) {
+    for (int k = pattern_.start[at(row)]; k < pattern_.start[at(row + 1)]; ++k) {
+      const Real xj = x[pattern_.column[at(k)]];
+      values[k] = coefficients[gain][at(row % players_)] * (linear_[at(k)] + 2.0 * square_[at(k)] * xj);
+    }
+  }
+}
+
+}  // namespace mixed_order_game

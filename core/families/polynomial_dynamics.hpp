@@ -1,0 +1,32 @@
+// g_i(x)_l = gain_i sum_j (G_ijl x_jl + H_ijl x_jl^2), the family of the paper's example.
+#pragma once
+
+#include "families/unknown_dynamics.hpp"
+
+namespace mixed_order_game {
+
+class PolynomialDynamics final : public UnknownDynamics {
+ public:
+  enum Number { linear, square, gain };  ///< G_ijl, H_ijl, gain_i
+
+  PolynomialDynamics(int players, int dimension);
+
+  [[nodiscard]] std::unique_ptr<UnknownDynamics> clone() const override;
+  void refresh() override;
+  void values(const Real* x, Real* g) const override;
+  void values(const CoefficientsAs<Dual>& along, const Dual* x, Dual* g) const override;
+  void values(const CoefficientsAs<Dependencies>& of, const Dependencies* x, Dependencies* g) const override;
+  [[nodiscard]] const SparseRows& jacobian_pattern() const override { return pattern_; }
+  void jacobian(const Real* x, Real* values) const override;
+
+ private:
+  template <typename Scalar, typename Gain>
+  void values_as(const Scalar* x, Gain gain_of, Scalar* g) const;
+
+  int players_;
+  SparseRows pattern_;
+  std::vector<Real> linear_;  // along pattern_
+  std::vector<Real> square_;
+};
+
+}  // namespace mixed_order_game

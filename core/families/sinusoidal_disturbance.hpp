@@ -1,0 +1,25 @@
+// d_il(t) = bias + amplitude sin(frequency t + phase), the family of the paper's example.
+#pragma once
+
+#include "families/disturbance.hpp"
+
+namespace mixed_order_game {
+
+class SinusoidalDisturbance final : public Disturbance {
+ public:
+  enum Number { amplitude, frequency, phase, bias };  ///< all at entry(i, l); frequency in rad/s, phase in rad
+
+  SinusoidalDisturbance(int players, int dimension);
+
+  [[nodiscard]] std::unique_ptr<Disturbance> clone() const override;
+  void refresh() override {}
+  void values(Real t, Real* d) const override;
+  void values(const CoefficientsAs<Dual>& along, const Dual& t, Dual* d) const override;
+  void values(const CoefficientsAs<Dependencies>& of, const Dependencies& t, Dependencies* d) const override;
+
+ private:
+  template <typename Scalar>
+  void values_as(const CoefficientsAs<Scalar>& of, const Scalar& t, Scalar* d) const;
+};
+
+}  // namespace mixed_order_game

@@ -1,0 +1,82 @@
+#include "loop/loop_tangent.hpp"
+
+#include <algorithm>
+
+namespace mixed_order_game {
+
+LoopTangent::LoopTangent(const ClosedLoop& loop)
+    : state(at(loop.layout().size())),
+      d_ext(at(loop.shape().actions())),
+      control(d_ext.size()),
+      rate(state.size()),
+      loop_(&loop),
+      equations_(loop.parameters()),
+      state_(state.size()),
+      d_ext_(d_ext.size()),
+      rate_(state.size()) {
+  numbers_.centers.resize(loop.parameters().rbf.centers.size());
+  numbers_.edges.resize(at(loop.shape().players));
+}
+
+void LoopTangent::clear() {
+  std::fill(state.begin(), state.end(), 0.0);
+  std::fill(d_ext.begin(), d_ext.end(), 0.0);
+  time = 0.0;
+}
+
+void LoopTangent::follow(Real t, const Real* at_state, const Modes& modes) {
+  evaluate(nullptr, t, at_state, modes);
+}
+
+void LoopTangent::follow_parameters(const Parameters& direction, Real t, const Real* at_state, const Modes& modes) {
+  loop_->initial_state(direction.initial, state.data());
+  evaluate(&direction, t, at_state, modes);
+}
+
+void LoopTangent::evaluate(const Parameters* direction, Real t, const Real* at_state, const Modes& modes) {
+  const Parameters& parameters = loop_->parameters();
+  const auto with = [&](auto part, auto member) {
+    return Dual((parameters.*part).*member, direction == nullptr ? 0.0 : (direction->*part).*member);
+  };
+  numbers_.k1 = with(&Parameters::gains, &Gains::k1);
+  numbers_.k2 = with(&Parameters::gains, &Gains::k2);
+  numbers_.k3 = with(&Parameters::gains, &Gains::k3);
+  numbers_.k4 = with(&Parameters::gains, &Gains::k4);
+  numbers_.beta = with(&Parameters::gains, &Gains::beta);
+  numbers_.delta = with(&Parameters::gains, &Gains::delta);
+  numbers_.epsilon = with(&Parameters::gains, &Gains::epsilon);
+  numbers_.robust = parameters.strategy.robust ? 1.0 : 0.0;
+  numbers_.perturbed = parameters.strategy.perturbed ? 1.0 : 0.0;
+  numbers_.width = with(&Parameters::rbf, &RbfNetwork::width);
+  numbers_.W_max = with(&Parameters::rbf, &RbfNetwork::W_max);
+  for (std::size_t k = 0; k < numbers_.centers.size(); ++k) {
+    numbers_.centers[k] = {parameters.rbf.centers[k], direction == nullptr ? 0.0 : direction->rbf.centers[k]};
+  }
+  for (int i = 0; i < loop_->shape().players; ++i) {
+    auto& row = numbers_.edges[at(i)];
+    row.clear();
+    for (int k = 0; k < loop_->shape().players; ++k) {
+      const Dual weight(parameters.graph.weight(i, k), direction == nullptr ? 0.0 : direction->graph.weight(i, k));
+      if (weight.value != 0.0 || weight.along != 0.0) row.push_back({k, weight});
+    }
+  }
+  const auto family = [&](auto member) {
+    return CoefficientsAlong((parameters.*member)->coefficients,
+                             direction == nullptr ? nullptr : &(direction->*member)->coefficients);
+  };
+  const CoefficientsAlong cost = family(&Parameters::cost);
+  const CoefficientsAlong dynamics = family(&Parameters::dynamics);
+  const CoefficientsAlong disturbance = family(&Parameters::disturbance);
+  numbers_.cost = &cost;
+  numbers_.dynamics = &dynamics;
+  numbers_.disturbance = &disturbance;
+
+  for (std::size_t k = 0; k < state.size(); ++k) state_[k] = {at_state[k], state[k]};
+  for (std::size_t p = 0; p < d_ext.size(); ++p) d_ext_[p] = {0.0, d_ext[p]};
+  equations_.evaluate_control(numbers_, state_.data());
+  equations_.evaluate_rates(numbers_, {t, time}, state_.data(), d_ext_.data(), modes, rate_.data());
+  for (std::size_t p = 0; p < control.size(); ++p) control[p] = equations_.control[p].along;
+  for (std::size_t k = 0; k < rate.size(); ++k) rate[k] = rate_[k].along;
+}
+
+}  // namespace mixed_order_game
