@@ -168,7 +168,8 @@ void read_coefficients(const TomlEntry& table, int i, const Shape& shape, Coeffi
         break;
       case Indices::pair:
         read_pairs(entry, shape.players, pair, [&](int j, const TomlEntry& value) {
-          if (j == i) value.fail("no " + std::string(declared.key) + " of player " + std::to_string(i + 1) + " with itself");
+          if (j == i)
+            value.fail("no " + std::string(declared.key) + " of player " + std::to_string(i + 1) + " with itself");
           coefficients.set(number, i * shape.players + j, value.number());
         });
         break;

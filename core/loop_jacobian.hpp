@@ -5,13 +5,6 @@
 
 namespace mixed_order_game {
 
-/// One entry of a sparse matrix.
-struct MatrixEntry {
-  int row;
-  int column;
-  Real value;
-};
-
 class LoopJacobian {
  public:
   explicit LoopJacobian(const ClosedLoop& loop);
@@ -21,13 +14,6 @@ class LoopJacobian {
 
   /// Linearizes at a state; signals are those of ClosedLoop::evaluate_seeking at the same state.
   void linearize(const Real* state, const Signals& signals, const Modes& modes);
-
-  /// product = J vector, both of the state's length; control, unless null, takes (d u / d state) vector.
-  void multiply(const Real* vector, Real* product, Real* control = nullptr) const;
-
-  /// All entries that may differ from zero, each position once; the matrix of multiply(), written out entry by entry.
-  /// With coupled = false the derivatives of the activations with respect to the estimates are left out.
-  [[nodiscard]] std::vector<MatrixEntry> entries(bool coupled) const;
 
   [[nodiscard]] const ClosedLoop& loop() const { return *loop_; }
 
@@ -44,7 +30,6 @@ class LoopJacobian {
 
  private:
   const ClosedLoop* loop_;
-  mutable AlignedVector scratch_;
 };
 
 }  // namespace mixed_order_game

@@ -22,9 +22,6 @@ class NewtonSolver {
   virtual void solve(Real* b) = 0;
 };
 
-/// Dense LU of the whole matrix, by Eigen: the plain way, against which the structured one is judged.
-std::unique_ptr<NewtonSolver> make_dense_newton(bool coupled = true);
-
 /// Elimination along the structure of the closed loop; see structured_newton.cpp. With coupled = false the derivatives
 /// of the activations with respect to the estimates are left out of the matrix, which makes what remains sparse.
 std::unique_ptr<NewtonSolver> make_structured_newton(bool coupled = true);

@@ -297,8 +297,7 @@ void Instance::get_directional_derivative(std::span<const std::uint32_t> unknown
     }
   }
   const View source = prepare_tangent(unknowns);
-  const Tangent tangent =
-      directional_derivative_.along({knowns, changes}, equations, source, standing());
+  const Tangent tangent = directional_derivative_.along({knowns, changes}, equations, source, standing());
   read_along(unknowns, source, tangent, derivatives);
 }
 

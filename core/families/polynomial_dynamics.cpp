@@ -28,7 +28,7 @@ std::unique_ptr<UnknownDynamics> PolynomialDynamics::clone() const {
 }
 
 void PolynomialDynamics::refresh() {
-  if (pattern_.entries() != 0) return;  // the game file fixes the terms
+  if (pattern_.entries() != 0) return;         // the game file fixes the terms
   std::map<int, std::pair<Real, Real>> terms;  // G and H by slot entry(i, l) N + j
   for (const auto& [slot, value] : coefficients.terms(linear)) terms[slot].first = value;
   for (const auto& [slot, value] : coefficients.terms(square)) terms[slot].second = value;

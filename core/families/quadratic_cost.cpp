@@ -85,8 +85,8 @@ void QuadraticCost::own_gradients_as(const CoefficientsAs<Scalar>& coefficients_
     for (int i = 0; i < players_; ++i) {
       const Scalar* row = points + i * stride + l * players_;
       const int p = l * players_ + i;
-      gradient[p] = own_gradient(
-          i, coefficients_as.value(quadratic, i), coefficients_as.value(linear, p), row, [&](auto visit) {
+      gradient[p] =
+          own_gradient(i, coefficients_as.value(quadratic, i), coefficients_as.value(linear, p), row, [&](auto visit) {
             for (int j = 0; j < players_; ++j) {
               const int slot = i * players_ + j;
               if (!coefficients_as.vanishes(coupling, slot)) visit(j, coefficients_as.value(coupling, slot));

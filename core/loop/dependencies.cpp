@@ -55,9 +55,7 @@ Dependencies& Dependencies::operator+=(const Dependencies& other) {
   return *this;
 }
 
-Dependencies operator-(const Dependencies& a) {
-  return a.number_ ? Dependencies(-*a.number_) : a;
-}
+Dependencies operator-(const Dependencies& a) { return a.number_ ? Dependencies(-*a.number_) : a; }
 
 Dependencies operator*(const Dependencies& a, const Dependencies& b) {
   if (a.number_ && b.number_) return *a.number_ * *b.number_;

@@ -25,7 +25,9 @@ struct Dual {
 inline Dual operator-(const Dual& a) { return {-a.value, -a.along}; }
 inline Dual operator+(const Dual& a, const Dual& b) { return {a.value + b.value, a.along + b.along}; }
 inline Dual operator-(const Dual& a, const Dual& b) { return {a.value - b.value, a.along - b.along}; }
-inline Dual operator*(const Dual& a, const Dual& b) { return {a.value * b.value, a.along * b.value + a.value * b.along}; }
+inline Dual operator*(const Dual& a, const Dual& b) {
+  return {a.value * b.value, a.along * b.value + a.value * b.along};
+}
 inline Dual operator/(const Dual& a, const Dual& b) {
   const Real ratio = a.value / b.value;
   return {ratio, (a.along - ratio * b.along) / b.value};

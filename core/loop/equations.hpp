@@ -109,8 +109,8 @@ void LoopEquations<Scalar>::evaluate_rates(const LoopNumbers<Scalar>& number, co
     const Scalar r = on_sphere ? network[at(p)] / number.W_max : Scalar(0.0);
     for (int m = 0; m < shape.neurons; ++m) {
       const int w = layout.weights_of(m) + p;
-      rate[w] = number.robust * terms::weight_rate(number.beta, error[at(p)], activation[at(m * shape.players + i)], r,
-                                                   state[w]);
+      rate[w] = number.robust *
+                terms::weight_rate(number.beta, error[at(p)], activation[at(m * shape.players + i)], r, state[w]);
     }
   }
   // y_ij' = -k3 (sum_k a_ik (y_ij - y_kj) + a_ij (y_ij - xbar_j))

@@ -15,7 +15,10 @@ LoopTangent::LoopTangent(const ClosedLoop& loop)
       d_ext_(d_ext.size()),
       rate_(state.size()) {
   numbers_.centers.resize(loop.parameters().rbf.centers.size());
-  numbers_.edges.resize(at(loop.shape().players));
+  const NeighbourRows neighbours = loop.parameters().graph.neighbours();
+  for (int i = 0; i < loop.shape().players; ++i) {
+    numbers_.edges.emplace_back().reserve(at(neighbours.start[i + 1] - neighbours.start[i]));
+  }
 }
 
 void LoopTangent::clear() {
@@ -24,9 +27,7 @@ void LoopTangent::clear() {
   time = 0.0;
 }
 
-void LoopTangent::follow(Real t, const Real* at_state, const Modes& modes) {
-  evaluate(nullptr, t, at_state, modes);
-}
+void LoopTangent::follow(Real t, const Real* at_state, const Modes& modes) { evaluate(nullptr, t, at_state, modes); }
 
 void LoopTangent::follow_parameters(const Parameters& direction, Real t, const Real* at_state, const Modes& modes) {
   loop_->initial_state(direction.initial, state.data());

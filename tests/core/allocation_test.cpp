@@ -6,7 +6,7 @@
 
 #include "game.hpp"
 #include "integrator.hpp"
-#include "loop_tangent.hpp"
+#include "loop/loop_tangent.hpp"
 #include "random_game.hpp"
 
 namespace {
@@ -70,7 +70,6 @@ TEST(Allocation, NoneAlongADirection) {
     const Modes inside(at(loop.shape().actions()));
     const std::vector<Real> input(inside.size(), 1.0);
     Signals signals(loop.shape());
-    LoopJacobian jacobian(loop);
     LoopTangent tangent(loop);
     std::vector<Real> state(tangent.state.size());
     std::vector<Real> rate(state.size());
@@ -78,11 +77,10 @@ TEST(Allocation, NoneAlongADirection) {
     allocations = 0;
     counting = true;
     loop.evaluate(0.1, state.data(), input.data(), inside, signals, rate.data());
-    jacobian.linearize(state.data(), signals, inside);
     tangent.state.back() = 1.0;
-    tangent.follow_state(jacobian);
-    tangent.add_input(input.data());
-    tangent.add_time(0.1, 1.0);
+    tangent.d_ext.back() = 1.0;
+    tangent.time = 1.0;
+    tangent.follow(0.1, state.data(), inside);
     counting = false;
     EXPECT_EQ(allocations, 0) << "game " << recipe.seed;
   }

@@ -7,6 +7,7 @@
 #include <iterator>
 
 #include "errors.hpp"
+#include "families/quadratic_cost.hpp"
 #include "game.hpp"
 #include "random_game.hpp"
 
@@ -39,9 +40,9 @@ TEST(NashEquilibrium, MakesEveryGradientVanish) {
 TEST(NashEquilibrium, OfTwoPlayersByHand) {
   // f_1 = x_1^2 + 3 (x_1 - x_2)^2 - 8 x_1, f_2 = 2 x_2^2 - 4 x_2: x_2 = 1 and 8 x_1 = 6 x_2 + 8
   QuadraticCost cost(2, 1);
-  cost.quadratic = {1.0, 2.0};
-  cost.linear = {-8.0, -4.0};
-  cost.coupling = {0.0, 3.0, 0.0, 0.0};
+  cost.coefficients[QuadraticCost::quadratic] = {1.0, 2.0};
+  cost.coefficients[QuadraticCost::linear] = {-8.0, -4.0};
+  cost.coefficients[QuadraticCost::coupling] = {0.0, 3.0, 0.0, 0.0};
   cost.refresh();
   const Shape shape{.players = 2, .dimension = 1, .neurons = 1, .order = {1, 2}};
   const std::vector<Real> x_star = nash_equilibrium(cost, shape);
@@ -52,11 +53,11 @@ TEST(NashEquilibrium, OfTwoPlayersByHand) {
 TEST(NashEquilibrium, IsRefusedWhereItIsNotUnique) {
   // both players only wish to meet, wherever
   QuadraticCost cost(2, 1);
-  cost.coupling = {0.0, 1.0, 1.0, 0.0};
+  cost.coefficients[QuadraticCost::coupling] = {0.0, 1.0, 1.0, 0.0};
   cost.refresh();
   const Shape shape{.players = 2, .dimension = 1, .neurons = 1, .order = {1, 1}};
   EXPECT_THROW(nash_equilibrium(cost, shape), GameError);
-  cost.quadratic = {0.0, 1e-6};  // one of them now has a preference
+  cost.coefficients[QuadraticCost::quadratic] = {0.0, 1e-6};  // one of them now has a preference
   cost.refresh();
   EXPECT_NO_THROW(nash_equilibrium(cost, shape));
 }
@@ -64,6 +65,7 @@ TEST(NashEquilibrium, IsRefusedWhereItIsNotUnique) {
 /// f_1 = exp(x_1 - 1) - x_1 + x_1 x_2 and f_2 = cosh(x_2) - x_1 x_2, which are not quadratic.
 class ExponentialCost final : public Cost {
  public:
+  ExponentialCost() : Cost(Coefficients({}, 2, 1)) {}
   [[nodiscard]] std::unique_ptr<Cost> clone() const override { return std::make_unique<ExponentialCost>(*this); }
   [[nodiscard]] Real value(int i, const Real* x) const override {
     return i == 0 ? std::exp(x[0] - 1.0) - x[0] + x[0] * x[1] : std::cosh(x[1]) - x[0] * x[1];
@@ -79,11 +81,10 @@ class ExponentialCost final : public Cost {
     values[2] = -1.0;
     values[3] = std::cosh(points[stride + 1]);
   }
-  [[nodiscard]] std::unique_ptr<Cost> zero_direction() const override { return clone(); }
-  void own_gradients_along(const Cost& /*direction*/, const Real* /*points*/, int /*stride*/,
-                           Real* derivative) const override {
-    derivative[0] = derivative[1] = 0.0;
-  }
+  void own_gradients(const CoefficientsAs<Dual>& /*none*/, const Dual* /*points*/, int /*stride*/,
+                     Dual* /*gradient*/) const override {}
+  void own_gradients(const CoefficientsAs<Dependencies>& /*none*/, const Dependencies* /*points*/, int /*stride*/,
+                     Dependencies* /*gradient*/) const override {}
   void refresh() override {}
 
  private:
@@ -108,17 +109,18 @@ TEST(NashEquilibrium, MovesWithTheCosts) {
     const Parameters parameters = parse_game(toml_of(random_game(recipe))).parameters;
     const auto& cost = static_cast<const QuadraticCost&>(*parameters.cost);
     QuadraticCost direction(parameters.shape.players, parameters.shape.dimension);
-    random.fill(direction.quadratic, -1.0, 1.0);
-    random.fill(direction.linear, -1.0, 1.0);
-    random.fill(direction.coupling, -1.0, 1.0);
+    random.fill(direction.coefficients[QuadraticCost::quadratic], -1.0, 1.0);
+    random.fill(direction.coefficients[QuadraticCost::linear], -1.0, 1.0);
+    random.fill(direction.coefficients[QuadraticCost::coupling], -1.0, 1.0);
     for (int i = 0; i < parameters.shape.players; ++i) {
-      direction.coupling[at(i) * at(parameters.shape.players) + at(i)] = 0.0;
+      direction.coefficients[QuadraticCost::coupling][at(i) * at(parameters.shape.players) + at(i)] = 0.0;
     }
     direction.refresh();
     const auto moved = [&](Real s) {
       QuadraticCost other = cost;
-      for (const auto member : {&QuadraticCost::quadratic, &QuadraticCost::linear, &QuadraticCost::coupling}) {
-        for (std::size_t k = 0; k < (other.*member).size(); ++k) (other.*member)[k] += s * (direction.*member)[k];
+      for (const int number : {QuadraticCost::quadratic, QuadraticCost::linear, QuadraticCost::coupling}) {
+        std::vector<Real>& values = other.coefficients[number];
+        for (std::size_t k = 0; k < values.size(); ++k) values[k] += s * direction.coefficients[number][k];
       }
       other.refresh();
       return nash_equilibrium(other, parameters.shape);
@@ -136,15 +138,15 @@ TEST(NashEquilibrium, MovesWithTheCosts) {
 // Player 3 follows 2, 2 follows 1, and 1 follows nobody: what is downstream cannot be felt, not even by rounding.
 TEST(NashEquilibrium, OfAPlayerThatFollowsNobodyStandsStill) {
   QuadraticCost cost(3, 1);
-  cost.quadratic = {0.3, 0.7, 0.1};
-  cost.linear = {1.0, -2.0, 0.5};
-  cost.coupling = {0.0, 0.0, 0.0, 9.0, 0.0, 0.0, 0.0, 7.0, 0.0};
+  cost.coefficients[QuadraticCost::quadratic] = {0.3, 0.7, 0.1};
+  cost.coefficients[QuadraticCost::linear] = {1.0, -2.0, 0.5};
+  cost.coefficients[QuadraticCost::coupling] = {0.0, 0.0, 0.0, 9.0, 0.0, 0.0, 0.0, 7.0, 0.0};
   cost.refresh();
   const Shape shape{.players = 3, .dimension = 1, .neurons = 1, .order = {1, 1, 1}};
   const std::vector<Real> x_star = nash_equilibrium(cost, shape);
   EXPECT_DOUBLE_EQ(x_star[0], -1.0 / 0.6);
   QuadraticCost direction(3, 1);
-  direction.linear = {0.0, 0.9, 0.8};
+  direction.coefficients[QuadraticCost::linear] = {0.0, 0.9, 0.8};
   direction.refresh();
   const std::vector<Real> along = nash_equilibrium_along(cost, direction, shape, x_star.data());
   EXPECT_EQ(along[0], 0.0);
@@ -155,8 +157,8 @@ TEST(NashEquilibrium, OfAPlayerThatFollowsNobodyStandsStill) {
 TEST(StrongMonotonicity, IsTheSmallestEigenvalueOfTheSymmetricPart) {
   // P' = [[2 q_1 + 2 c_12, -2 c_12], [-2 c_21, 2 q_2 + 2 c_21]] with q = (1, 2), c_12 = 3, c_21 = 0
   QuadraticCost cost(2, 1);
-  cost.quadratic = {1.0, 2.0};
-  cost.coupling = {0.0, 3.0, 0.0, 0.0};
+  cost.coefficients[QuadraticCost::quadratic] = {1.0, 2.0};
+  cost.coefficients[QuadraticCost::coupling] = {0.0, 3.0, 0.0, 0.0};
   cost.refresh();
   const Shape shape{.players = 2, .dimension = 1, .neurons = 1, .order = {1, 2}};
   // symmetric part [[8, -3], [-3, 4]]: eigenvalues 6 -+ sqrt(13)

@@ -4,6 +4,9 @@
 #include <iterator>
 
 #include "errors.hpp"
+#include "families/polynomial_dynamics.hpp"
+#include "families/quadratic_cost.hpp"
+#include "families/sinusoidal_disturbance.hpp"
 #include "game.hpp"
 #include "reference_loop.hpp"
 
@@ -106,19 +109,22 @@ TEST(GameDefinition, NumbersLandWhereTheCoreExpectsThem) {
   EXPECT_EQ(p.initial.y, (std::vector<Real>{1.0, 3.0, 4.0, 2.0, 3.0, 5.0,        // player 1's estimates
                                             0.25, 0.25, 0.25, 0.25, 0.25, 0.25,  // player 2's
                                             0.0, 0.0, 0.0, 0.0, 0.0, 0.0}));     // player 3's
-  const QuadraticCost& cost = cost_of(p);
-  EXPECT_EQ(cost.quadratic, (std::vector<Real>{1.0, 2.0, 3.0}));
-  EXPECT_EQ(cost.linear, (std::vector<Real>{0.5, -4.0, 0.0, -0.5, -4.0, 0.0}));
-  EXPECT_EQ(cost.constant, (std::vector<Real>{7.0, 0.0, 0.0}));
-  EXPECT_EQ(cost.coupling, (std::vector<Real>{0.0, 0.0, 2.0, 0.0, 0.0, 0.0, 0.25, 0.75, 0.0}));
+  const Cost& cost = *p.cost;
+  EXPECT_EQ(cost.coefficients[QuadraticCost::quadratic], (std::vector<Real>{1.0, 2.0, 3.0}));
+  EXPECT_EQ(cost.coefficients[QuadraticCost::linear], (std::vector<Real>{0.5, -4.0, 0.0, -0.5, -4.0, 0.0}));
+  EXPECT_EQ(cost.coefficients[QuadraticCost::constant], (std::vector<Real>{7.0, 0.0, 0.0}));
+  EXPECT_EQ(cost.coefficients[QuadraticCost::coupling],
+            (std::vector<Real>{0.0, 0.0, 2.0, 0.0, 0.0, 0.0, 0.25, 0.75, 0.0}));
   EXPECT_EQ(cost.hessian_pattern().entries(), 2 * (2 + 1 + 3));  // refreshed
-  const SinusoidalDisturbance& disturbance = disturbance_of(p);
-  EXPECT_EQ(disturbance.amplitude, (std::vector<Real>{0.0, 0.0, 1.0, 0.0, 0.0, 2.0}));
-  EXPECT_EQ(disturbance.frequency, (std::vector<Real>{0.0, 0.0, 3.0, 0.0, 0.0, 3.0}));
-  EXPECT_EQ(disturbance.phase, (std::vector<Real>{0.0, 0.0, 0.5, 0.0, 0.0, 0.0}));
-  EXPECT_EQ(disturbance.bias, (std::vector<Real>{0.0, 0.0, -1.0, 0.0, 0.0, -1.0}));
-  const PolynomialDynamics& dynamics = dynamics_of(p);
-  EXPECT_EQ(dynamics.gain, (std::vector<Real>{1.0, 1.0, 1.0}));
+  const Disturbance& disturbance = *p.disturbance;
+  EXPECT_EQ(disturbance.coefficients[SinusoidalDisturbance::amplitude],
+            (std::vector<Real>{0.0, 0.0, 1.0, 0.0, 0.0, 2.0}));
+  EXPECT_EQ(disturbance.coefficients[SinusoidalDisturbance::frequency],
+            (std::vector<Real>{0.0, 0.0, 3.0, 0.0, 0.0, 3.0}));
+  EXPECT_EQ(disturbance.coefficients[SinusoidalDisturbance::phase], (std::vector<Real>{0.0, 0.0, 0.5, 0.0, 0.0, 0.0}));
+  EXPECT_EQ(disturbance.coefficients[SinusoidalDisturbance::bias], (std::vector<Real>{0.0, 0.0, -1.0, 0.0, 0.0, -1.0}));
+  const UnknownDynamics& dynamics = *p.dynamics;
+  EXPECT_EQ(dynamics.coefficients[PolynomialDynamics::gain], (std::vector<Real>{1.0, 1.0, 1.0}));
   EXPECT_EQ(dynamics.jacobian_pattern().entries(), 4);  // linear and square terms of one entry are merged
   std::vector<Real> g(6);
   dynamics.values(std::vector<Real>{1.0, 2.0, 3.0, 4.0, 5.0, 6.0}.data(), g.data());
@@ -176,12 +182,13 @@ TEST(GameDefinition, OfARandomGameIsReadBack) {
     EXPECT_EQ(p.strategy.perturbed, plain.perturbed);
     EXPECT_EQ(p.initial.x, flat_actions(plain.x0));
     EXPECT_EQ(p.initial.reference, flat_actions(plain.reference0));
-    EXPECT_EQ(cost_of(p).linear, flat_actions(plain.linear));
-    EXPECT_EQ(disturbance_of(p).phase, flat_actions(plain.phase));
+    EXPECT_EQ(p.cost->coefficients[QuadraticCost::linear], flat_actions(plain.linear));
+    EXPECT_EQ(p.disturbance->coefficients[SinusoidalDisturbance::phase], flat_actions(plain.phase));
     for (int i = 0; i < p.shape.players; ++i) {
       for (int j = 0; j < p.shape.players; ++j) {
         EXPECT_EQ(p.graph.weight(i, j), plain.adjacency[at(i)][at(j)]);
-        EXPECT_EQ(cost_of(p).coupling[at(i * p.shape.players + j)], plain.coupling[at(i)][at(j)]);
+        EXPECT_EQ(p.cost->coefficients[QuadraticCost::coupling][at(i * p.shape.players + j)],
+                  plain.coupling[at(i)][at(j)]);
       }
     }
   }

@@ -10,6 +10,7 @@
 #include "equilibrium.hpp"
 #include "errors.hpp"
 #include "game.hpp"
+#include "loop_matrix.hpp"
 #include "random_game.hpp"
 
 namespace mixed_order_game {

@@ -2,7 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include "families/quadratic_cost.hpp"
 #include "game.hpp"
+#include "loop_matrix.hpp"
 #include "reference_loop.hpp"
 
 namespace mixed_order_game {
@@ -95,45 +97,13 @@ class LoopJacobianOfRandomGame : public ::testing::TestWithParam<Recipe> {
 TEST_P(LoopJacobianOfRandomGame, EntriesAreTheDerivatives) {
   for (int repeat = 0; repeat < 2; ++repeat) {
     Linearized linearized(game_, loop_, jacobian_, random_);
-    expect_close(dense(jacobian_.entries(true), size_), linearized.expected(true));
+    expect_close(dense(matrix_of(jacobian_, true), size_), linearized.expected(true));
   }
 }
 
 TEST_P(LoopJacobianOfRandomGame, UncoupledEntriesLeaveOutTheActivations) {
   Linearized linearized(game_, loop_, jacobian_, random_);
-  expect_close(dense(jacobian_.entries(false), size_), linearized.expected(false));
-}
-
-TEST_P(LoopJacobianOfRandomGame, ProductsAreTheDerivatives) {
-  Linearized linearized(game_, loop_, jacobian_, random_);
-  Rows computed = rows_of(size_, size_);
-  std::vector<Real> direction(size_, 0.0);
-  std::vector<Real> product(size_);
-  for (std::size_t column = 0; column < size_; ++column) {
-    direction[column] = 1.0;
-    jacobian_.multiply(direction.data(), product.data());
-    direction[column] = 0.0;
-    for (std::size_t row = 0; row < size_; ++row) computed[row][column] = product[row];
-  }
-  expect_close(computed, linearized.expected(true));
-}
-
-TEST_P(LoopJacobianOfRandomGame, ProductsAreLinear) {
-  const Linearized linearized(game_, loop_, jacobian_, random_);
-  const Rows matrix = dense(jacobian_.entries(true), size_);
-  std::vector<Real> direction(size_);
-  std::vector<Real> product(size_);
-  random_.fill(direction, -1.0, 1.0);
-  jacobian_.multiply(direction.data(), product.data());
-  for (std::size_t row = 0; row < size_; ++row) {
-    Real expected = 0.0;
-    Real size = 0.0;
-    for (std::size_t column = 0; column < size_; ++column) {
-      expected += matrix[row][column] * direction[column];
-      size += std::abs(matrix[row][column] * direction[column]);
-    }
-    EXPECT_NEAR(product[row], expected, 1e-13 * size) << "row " << row;
-  }
+  expect_close(dense(matrix_of(jacobian_, false), size_), linearized.expected(false));
 }
 
 INSTANTIATE_TEST_SUITE_P(Assorted, LoopJacobianOfRandomGame, ::testing::ValuesIn(assorted_recipes()),
@@ -148,12 +118,12 @@ TEST(LoopJacobian, FollowsChangedParametersAfterRefresh) {
   game.coupling[0][1] = game.coupling[0][1] == 0.0 ? 0.7 : 0.0;
   game.adjacency[0][1] = game.adjacency[1][0] = game.adjacency[0][1] == 0.0 ? 1.3 : 0.2;
   loop.parameters().gains.k2 = game.k2;
-  cost_of(loop.parameters()).coupling[0 * 3 + 1] = game.coupling[0][1];
+  loop.parameters().cost->coefficients[QuadraticCost::coupling][0 * 3 + 1] = game.coupling[0][1];
   loop.parameters().graph.set_weight(0, 1, game.adjacency[0][1]);
   loop.refresh();
   jacobian.refresh();
   Linearized linearized(game, loop, jacobian, random);
-  expect_close(dense(jacobian.entries(true), at(loop.layout().size())), linearized.expected(true));
+  expect_close(dense(matrix_of(jacobian, true), at(loop.layout().size())), linearized.expected(true));
 }
 
 TEST(LoopJacobian, OfAnAmplitudeOfZeroHasNoRobustTerm) {
@@ -163,7 +133,7 @@ TEST(LoopJacobian, OfAnAmplitudeOfZeroHasNoRobustTerm) {
   LoopJacobian jacobian(loop);
   RandomNumbers random(10);
   Linearized linearized(game, loop, jacobian, random);
-  expect_close(dense(jacobian.entries(true), at(loop.layout().size())), linearized.expected(true));
+  expect_close(dense(matrix_of(jacobian, true), at(loop.layout().size())), linearized.expected(true));
 }
 
 }  // namespace

@@ -1,9 +1,12 @@
-#include "loop_tangent.hpp"
+#include "loop/loop_tangent.hpp"
 
 #include <gtest/gtest.h>
 
 #include <functional>
 
+#include "families/polynomial_dynamics.hpp"
+#include "families/quadratic_cost.hpp"
+#include "families/sinusoidal_disturbance.hpp"
 #include "game.hpp"
 #include "reference_loop.hpp"
 
@@ -71,20 +74,16 @@ class LoopTangentOfRandomGame : public ::testing::TestWithParam<Recipe> {
  protected:
   PlainGame game_ = random_game(GetParam());
   ClosedLoop loop_{parse_game(toml_of(game_)).parameters};
-  LoopJacobian jacobian_{loop_};
   LoopTangent tangent_{loop_};
   RandomNumbers random_{3000 + GetParam().seed};
   std::size_t size_ = at(loop_.layout().size());
-  Signals signals_{loop_.shape()};
 
-  void linearize(const std::vector<Real>& state, const Rows& d_ext, const std::vector<std::vector<int>>& on_sphere) {
+  Modes modes_of(const std::vector<std::vector<int>>& on_sphere) const {
     Modes modes;
     for (std::size_t l = 0; l < game_.dimension; ++l) {
       for (std::size_t i = 0; i < game_.players; ++i) modes.push_back(on_sphere[i][l] != 0 ? 1 : 0);
     }
-    std::vector<Real> rate(size_);
-    loop_.evaluate(t, state.data(), flat_actions(d_ext).data(), modes, signals_, rate.data());
-    jacobian_.linearize(state.data(), signals_, modes);
+    return modes;
   }
 };
 
@@ -92,13 +91,12 @@ TEST_P(LoopTangentOfRandomGame, FollowsTheState) {
   std::vector<std::vector<int>> on_sphere;
   LoopState<Real> state = random_state(game_, random_, on_sphere);
   const Rows no_input = rows_of(game_.players, game_.dimension);
-  linearize(state.flat(), no_input, on_sphere);
   constexpr Real h = 1e-30;
   for (int repeat = 0; repeat < 5; ++repeat) {
     Numbers direction(size_);
     random_.fill(direction, -1.0, 1.0);
     std::copy(direction.begin(), direction.end(), tangent_.state.begin());
-    tangent_.follow_state(jacobian_);
+    tangent_.follow(t, state.flat().data(), modes_of(on_sphere));
     std::vector<std::complex<Real>> moved;
     const std::vector<Real> flat = state.flat();
     for (std::size_t k = 0; k < size_; ++k) moved.emplace_back(flat[k], h * direction[k]);
@@ -114,14 +112,16 @@ TEST_P(LoopTangentOfRandomGame, FollowsTheState) {
 
 TEST_P(LoopTangentOfRandomGame, FollowsInputsAndTime) {
   std::vector<std::vector<int>> on_sphere;
-  const LoopState<Real> state = random_state(game_, random_, on_sphere);
+  LoopState<Real> state = random_state(game_, random_, on_sphere);
   Rows d_ext = rows_of(game_.players, game_.dimension);
   Rows direction = d_ext;
   random_.fill(d_ext, -1.0, 1.0);
   random_.fill(direction, -1.0, 1.0);
   constexpr Real time_direction = 0.3;
-  tangent_.add_input(flat_actions(direction).data());
-  tangent_.add_time(t, time_direction);
+  const Numbers input = flat_actions(direction);
+  std::copy(input.begin(), input.end(), tangent_.d_ext.begin());
+  tangent_.time = time_direction;
+  tangent_.follow(t, state.flat().data(), modes_of(on_sphere));
   const auto along = [&](Real s) {
     Rows moved = d_ext;
     for (std::size_t i = 0; i < game_.players; ++i) {
@@ -203,7 +203,8 @@ std::vector<Move> moves_of(const PlainGame& game, RandomNumbers& random) {
                    },
                    [=](Parameters& direction) {
                      for (std::size_t i = 0; i < N; ++i) {
-                       for (std::size_t j = 0; j < N; ++j) cost_of(direction).coupling[i * N + j] = coupling[i][j];
+                       for (std::size_t j = 0; j < N; ++j)
+                         direction.cost->coefficients[QuadraticCost::coupling][i * N + j] = coupling[i][j];
                      }
                    }});
   Numbers quadratic(N);
@@ -212,7 +213,7 @@ std::vector<Move> moves_of(const PlainGame& game, RandomNumbers& random) {
                    [=](PlainGame& moved, Real s) {
                      for (std::size_t i = 0; i < N; ++i) moved.quadratic[i] += s * quadratic[i];
                    },
-                   [=](Parameters& direction) { cost_of(direction).quadratic = quadratic; }});
+                   [=](Parameters& direction) { direction.cost->coefficients[QuadraticCost::quadratic] = quadratic; }});
   const auto add_rows = [&](const char* name, Rows PlainGame::* plain,
                             const std::function<void(Parameters&, const Numbers&)>& core) {
     Rows rows = rows_of(N, D);
@@ -225,13 +226,18 @@ std::vector<Move> moves_of(const PlainGame& game, RandomNumbers& random) {
                      },
                      [=](Parameters& direction) { core(direction, flat_actions(rows)); }});
   };
-  add_rows("linear", &PlainGame::linear, [](Parameters& to, const Numbers& v) { cost_of(to).linear = v; });
-  add_rows("amplitude", &PlainGame::amplitude,
-           [](Parameters& to, const Numbers& v) { disturbance_of(to).amplitude = v; });
-  add_rows("frequency", &PlainGame::frequency,
-           [](Parameters& to, const Numbers& v) { disturbance_of(to).frequency = v; });
-  add_rows("phase", &PlainGame::phase, [](Parameters& to, const Numbers& v) { disturbance_of(to).phase = v; });
-  add_rows("bias", &PlainGame::bias, [](Parameters& to, const Numbers& v) { disturbance_of(to).bias = v; });
+  add_rows("linear", &PlainGame::linear,
+           [](Parameters& to, const Numbers& v) { to.cost->coefficients[QuadraticCost::linear] = v; });
+  add_rows("amplitude", &PlainGame::amplitude, [](Parameters& to, const Numbers& v) {
+    to.disturbance->coefficients[SinusoidalDisturbance::amplitude] = v;
+  });
+  add_rows("frequency", &PlainGame::frequency, [](Parameters& to, const Numbers& v) {
+    to.disturbance->coefficients[SinusoidalDisturbance::frequency] = v;
+  });
+  add_rows("phase", &PlainGame::phase,
+           [](Parameters& to, const Numbers& v) { to.disturbance->coefficients[SinusoidalDisturbance::phase] = v; });
+  add_rows("bias", &PlainGame::bias,
+           [](Parameters& to, const Numbers& v) { to.disturbance->coefficients[SinusoidalDisturbance::bias] = v; });
   add_rows("x0", &PlainGame::x0, [](Parameters& to, const Numbers& v) { to.initial.x = v; });
   Blocks y0 = game.y0;
   random.fill(y0, -1.0, 1.0);
@@ -263,7 +269,7 @@ std::vector<Move> moves_of(const PlainGame& game, RandomNumbers& random) {
                        }
                      }
                    },
-                   [=](Parameters& direction) { dynamics_of(direction).gain = gain; }});
+                   [=](Parameters& direction) { direction.dynamics->coefficients[PolynomialDynamics::gain] = gain; }});
   return moves;
 }
 
@@ -277,14 +283,13 @@ TEST_P(LoopTangentOfRandomGame, FollowsParametersAtTheStart) {
     state.y = game.y0;
     return state;
   };
-  linearize(start_of(game_).flat(), no_input, inside);
   std::vector<Real> initial_state(size_);
   loop_.initial_state(initial_state.data());
   for (const Move& move : moves_of(game_, random_)) {
     Parameters direction = loop_.parameters().zero_direction();
     move.core(direction);
     direction.refresh();
-    tangent_.follow_parameters(jacobian_, direction, t, initial_state.data(), signals_);
+    tangent_.follow_parameters(direction, t, initial_state.data(), modes_of(inside));
     const auto along = [&](Real s) {
       PlainGame moved = game_;
       move.plain(moved, s);
@@ -303,16 +308,10 @@ TEST(LoopTangent, OfAnAmplitudeOfZeroHasNoRobustTerm) {
   const ClosedLoop loop(parse_game(toml_of(game)).parameters);
   std::vector<Real> state(at(loop.layout().size()));
   loop.initial_state(state.data());
-  Signals signals(loop.shape());
-  std::vector<Real> rate(state.size());
-  const std::vector<Real> no_input(at(loop.shape().actions()));
-  loop.evaluate(t, state.data(), no_input.data(), Modes(no_input.size()), signals, rate.data());
   Parameters direction = loop.parameters().zero_direction();
   direction.gains.delta = direction.gains.epsilon = 1.0;
-  LoopJacobian jacobian(loop);
-  jacobian.linearize(state.data(), signals, Modes(no_input.size()));
   LoopTangent tangent(loop);
-  tangent.follow_parameters(jacobian, direction, t, state.data(), signals);
+  tangent.follow_parameters(direction, t, state.data(), Modes(at(loop.shape().actions())));
   for (const Real change : rates_and_controls(tangent)) EXPECT_EQ(change, 0.0);
 }
 

@@ -4,7 +4,9 @@
 
 #include <cmath>
 
+#include "families/quadratic_cost.hpp"
 #include "game.hpp"
+#include "loop_matrix.hpp"
 #include "random_game.hpp"
 
 namespace mixed_order_game {
@@ -64,13 +66,10 @@ class NewtonSystem {
     EXPECT_LE(distance(solved, expected), 1e-12 * norm(expected)) << "gamma = " << gamma << ", coupled = " << coupled;
     if (!coupled) return;
     // and it solves the system itself: delta - gamma J delta = b
-    std::vector<Real> product(solved.size());
-    jacobian_.multiply(solved.data(), product.data());
+    std::vector<Real> product = product_of(jacobian_, solved);
     Real scale = norm(rhs);
     for (std::size_t k = 0; k < solved.size(); ++k) product[k] = solved[k] - gamma * product[k];
-    std::vector<Real> image(solved.size());
-    jacobian_.multiply(solved.data(), image.data());
-    scale += gamma * norm(image);
+    scale += gamma * norm(product_of(jacobian_, solved));
     EXPECT_LE(distance(product, rhs), 1e-11 * scale);
   }
 
@@ -135,7 +134,7 @@ TEST(StructuredNewtonRefresh, FollowsNewEdgesAndCouplings) {
   for (int i = 0; i < 5; ++i) {
     for (int j = 0; j < i; ++j) {
       loop.parameters().graph.set_weight(i, j, 0.7);
-      cost_of(loop.parameters()).coupling[at(i * 5 + j)] = 0.3;
+      loop.parameters().cost->coefficients[QuadraticCost::coupling][at(i * 5 + j)] = 0.3;
     }
   }
   loop.refresh();

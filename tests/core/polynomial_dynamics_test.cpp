@@ -1,4 +1,4 @@
-#include "polynomial_dynamics.hpp"
+#include "families/polynomial_dynamics.hpp"
 
 #include <gtest/gtest.h>
 
@@ -11,12 +11,16 @@ constexpr int D = 2;
 const std::vector<Real> x{1.0, 3.0, -1.0, 2.0, 5.0, 4.0};
 
 PolynomialDynamics dynamics() {
-  return {N,
-          D,
-          {{.player = 2, .other = 2, .coordinate = 1, .linear = 3.0},
-           {.player = 0, .other = 2, .coordinate = 0, .linear = 2.0, .square = -0.5},
-           {.player = 0, .other = 1, .coordinate = 0, .square = 1.0},
-           {.player = 1, .other = 0, .coordinate = 1, .linear = -1.0, .square = 0.25}}};
+  PolynomialDynamics made(N, D);
+  const auto slot = [](int i, int j, int l) { return (l * N + i) * N + j; };
+  made.coefficients.set(PolynomialDynamics::linear, slot(2, 2, 1), 3.0);
+  made.coefficients.set(PolynomialDynamics::linear, slot(0, 2, 0), 2.0);
+  made.coefficients.set(PolynomialDynamics::square, slot(0, 2, 0), -0.5);
+  made.coefficients.set(PolynomialDynamics::square, slot(0, 1, 0), 1.0);
+  made.coefficients.set(PolynomialDynamics::linear, slot(1, 0, 1), -1.0);
+  made.coefficients.set(PolynomialDynamics::square, slot(1, 0, 1), 0.25);
+  made.refresh();
+  return made;
 }
 
 TEST(PolynomialDynamics, ValuesAreTheFormula) {
@@ -25,14 +29,14 @@ TEST(PolynomialDynamics, ValuesAreTheFormula) {
   d.values(x.data(), g.data());
   // g_11 = x_21^2 + 2 x_31 - 0.5 x_31^2, g_22 = -x_12 + 0.25 x_12^2, g_32 = 3 x_32
   EXPECT_EQ(g, (std::vector<Real>{9.0 - 2.0 - 0.5, 0.0, 0.0, 0.0, -2.0 + 1.0, 12.0}));
-  d.gain = {2.0, -1.0, 0.5};
+  d.coefficients[PolynomialDynamics::gain] = {2.0, -1.0, 0.5};
   d.values(x.data(), g.data());
   EXPECT_EQ(g, (std::vector<Real>{13.0, 0.0, 0.0, 0.0, 1.0, 6.0}));
 }
 
 TEST(PolynomialDynamics, JacobianIsTheDerivativeOfTheValues) {
   PolynomialDynamics d = dynamics();
-  d.gain = {2.0, -1.0, 0.5};
+  d.coefficients[PolynomialDynamics::gain] = {2.0, -1.0, 0.5};
   const SparseRows& pattern = d.jacobian_pattern();
   ASSERT_EQ(pattern.rows(), N * D);
   EXPECT_EQ(pattern.start, (std::vector<int>{0, 2, 2, 2, 2, 3, 4}));
@@ -55,16 +59,16 @@ TEST(PolynomialDynamics, JacobianIsTheDerivativeOfTheValues) {
 
 TEST(PolynomialDynamics, ACloneKeepsGainsAndTerms) {
   PolynomialDynamics d = dynamics();
-  d.gain[0] = 3.0;
+  d.coefficients[PolynomialDynamics::gain][0] = 3.0;
   const std::unique_ptr<UnknownDynamics> clone = d.clone();
-  d.gain[0] = 7.0;
+  d.coefficients[PolynomialDynamics::gain][0] = 7.0;
   std::vector<Real> g(N * D);
   clone->values(x.data(), g.data());
   EXPECT_EQ(g[0], 3.0 * 6.5);
 }
 
 TEST(PolynomialDynamics, WithoutTermsIsZero) {
-  const PolynomialDynamics none(N, D, {});
+  const PolynomialDynamics none(N, D);
   std::vector<Real> g(N * D, 99.0);
   none.values(x.data(), g.data());
   EXPECT_EQ(g, std::vector<Real>(N * D, 0.0));

@@ -1,4 +1,4 @@
-#include "quadratic_cost.hpp"
+#include "families/quadratic_cost.hpp"
 
 #include <gtest/gtest.h>
 
@@ -20,10 +20,10 @@ constexpr int D = 3;
 QuadraticCost cost_of(const PlainGame& game) {
   QuadraticCost cost(N, D);
   for (int i = 0; i < N; ++i) {
-    cost.quadratic[at(i)] = game.quadratic[at(i)];
-    cost.constant[at(i)] = game.constant[at(i)];
-    for (int l = 0; l < D; ++l) cost.linear[at(l * N + i)] = game.linear[at(i)][at(l)];
-    for (int j = 0; j < N; ++j) cost.coupling[at(i * N + j)] = game.coupling[at(i)][at(j)];
+    cost.coefficients[QuadraticCost::quadratic][at(i)] = game.quadratic[at(i)];
+    cost.coefficients[QuadraticCost::constant][at(i)] = game.constant[at(i)];
+    for (int l = 0; l < D; ++l) cost.coefficients[QuadraticCost::linear][at(l * N + i)] = game.linear[at(i)][at(l)];
+    for (int j = 0; j < N; ++j) cost.coefficients[QuadraticCost::coupling][at(i * N + j)] = game.coupling[at(i)][at(j)];
   }
   cost.refresh();
   return cost;
@@ -111,18 +111,19 @@ TEST_F(QuadraticCostOfRandomGame, HessianRowsAreTheDerivativesOfTheGradient) {
 TEST_F(QuadraticCostOfRandomGame, ACloneIsIndependent) {
   const std::unique_ptr<Cost> clone = cost_.clone();
   const Real before = cost_.value(1, x_.data());
-  cost_.constant[1] += 5.0;
-  cost_.coupling[1 * N + 0] += 1.0;
+  cost_.coefficients[QuadraticCost::constant][1] += 5.0;
+  cost_.coefficients[QuadraticCost::coupling][1 * N + 0] += 1.0;
   cost_.refresh();
   EXPECT_EQ(clone->value(1, x_.data()), before);
   EXPECT_GT(cost_.value(1, x_.data()), before + 5.0);
 }
 
 TEST_F(QuadraticCostOfRandomGame, RefreshFollowsThePattern) {
-  std::fill(cost_.coupling.begin(), cost_.coupling.end(), 0.0);
+  std::fill(cost_.coefficients[QuadraticCost::coupling].begin(), cost_.coefficients[QuadraticCost::coupling].end(),
+            0.0);
   cost_.refresh();
   EXPECT_EQ(cost_.hessian_pattern().entries(), N * D);
-  cost_.coupling[2 * N + 3] = -0.5;  // players may also be repelled
+  cost_.coefficients[QuadraticCost::coupling][2 * N + 3] = -0.5;  // players may also be repelled
   cost_.refresh();
   EXPECT_EQ(cost_.hessian_pattern().entries(), N * D + D);
 }

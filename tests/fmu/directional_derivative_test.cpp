@@ -28,7 +28,7 @@ namespace {
 using Values = std::map<std::string, double>;
 /// Derivatives of every unknown (inner) with respect to every known (outer).
 using Table = std::map<std::string, Values>;
-using Dependencies = std::map<std::string, std::map<std::string, DependencyKind>>;  // by unknown, then known
+using DependencyTable = std::map<std::string, std::map<std::string, DependencyKind>>;  // by unknown, then known
 
 std::string name_of(const char* family, std::initializer_list<std::size_t> indices) {
   std::string name = family;
@@ -86,14 +86,14 @@ Table all_pairs(Slave& slave, Equations equations) {
 }
 
 /// Of the model structure, with names.
-Dependencies dependencies_of(const Model& model, Equations equations) {
+DependencyTable dependencies_of(const Model& model, Equations equations) {
   const ModelStructure structure = model_structure(model);
   std::vector<Unknown> unknowns = structure.initial_unknowns;
   if (equations == Equations::running) {
     unknowns = structure.outputs;
     unknowns.insert(unknowns.end(), structure.derivatives.begin(), structure.derivatives.end());
   }
-  Dependencies dependencies;
+  DependencyTable dependencies;
   for (const Unknown& unknown : unknowns) {
     auto& known = dependencies[model.variables.name(unknown.reference)];
     for (const Dependency& dependency : unknown.dependencies) {
@@ -103,7 +103,7 @@ Dependencies dependencies_of(const Model& model, Equations equations) {
   return dependencies;
 }
 
-void expect_zero_where_not_declared(const Table& table, const Dependencies& declared) {
+void expect_zero_where_not_declared(const Table& table, const DependencyTable& declared) {
   for (const auto& [known, column] : table) {
     for (const auto& [unknown, value] : column) {
       if (!declared.at(unknown).contains(known)) {
@@ -276,7 +276,7 @@ TEST_P(DirectionalDerivativeOfRandomGame, IsThatOfTheEquationsInARun) {
   game.W_max = 0.3;  // the sphere is reached and left
   Beside beside(game);
   Slave& slave = beside.slave;
-  const Dependencies declared = dependencies_of(slave.model(), Equations::running);
+  const DependencyTable declared = dependencies_of(slave.model(), Equations::running);
   slave.initialize(0.4);
   for (const auto& [start, end] : {std::pair{0.4, 0.401}, {0.401, 1.2}}) {
     ASSERT_EQ(slave.set("d_ext[1,1]", 3.0 * end), fmi2OK);
@@ -362,7 +362,7 @@ TEST(DirectionalDerivative, OfModelExchangeIsThatOfRatesAndOutputs) {
     const double t = importer.time;
     const std::vector<double> state = importer.state();
     const Table table = all_pairs(importer, Equations::running);
-    const Dependencies declared = dependencies_of(model, Equations::running);
+    const DependencyTable declared = dependencies_of(model, Equations::running);
     expect_zero_where_not_declared(table, declared);
     std::map<std::string, std::size_t> position;
     const ModelStructure structure = model_structure(model);
@@ -402,7 +402,7 @@ TEST(Structure, DependenciesInARunAreMinimalAndOfTheirKind) {
   const std::string three = small_game_with({{"W_max = 0.5", "W_max = 0.05"}});
   for (const std::string& game : {three, vector_centers_game()}) {
     Slave slave(game);
-    const Dependencies declared = dependencies_of(slave.model(), Equations::running);
+    const DependencyTable declared = dependencies_of(slave.model(), Equations::running);
     std::vector<std::vector<Table>> tables;  // by parameters, then by state
     for (int parameters = 0; parameters < 2; ++parameters) {
       ASSERT_EQ(fmi2Reset(slave.component), fmi2OK);
@@ -454,7 +454,7 @@ TEST(Structure, InitialDependenciesAreMinimal) {
     ASSERT_EQ(slave.set("epsilon", 20.0), fmi2OK);  // tanh must not be saturated
     ASSERT_EQ(fmi2SetupExperiment(slave.component, fmi2False, 0.0, 0.2, fmi2False, 0.0), fmi2OK);
     ASSERT_EQ(fmi2EnterInitializationMode(slave.component), fmi2OK);
-    const Dependencies declared = dependencies_of(slave.model(), Equations::initial);
+    const DependencyTable declared = dependencies_of(slave.model(), Equations::initial);
     const Table table = all_pairs(slave, Equations::initial);
     expect_zero_where_not_declared(table, declared);
     for (const auto& [unknown, dependencies] : declared) {
@@ -473,7 +473,7 @@ TEST(Structure, InitialDependenciesAreMinimal) {
 // exist.
 TEST(Structure, EquilibriaOfPlayersThatAreNotCoupledAreIndependent) {
   const Model model(outputs_only(small_game_with({{"coupling = [[1, 0.3], [3, 0.6]]", "coupling = []"}})));
-  const Dependencies declared = dependencies_of(model, Equations::initial);
+  const DependencyTable declared = dependencies_of(model, Equations::initial);
   const auto& first = declared.at("x_star[1,2]");
   EXPECT_TRUE(first.contains("cost_linear[2,2]"));
   EXPECT_TRUE(first.contains("cost_coupling[1,2]"));
@@ -623,7 +623,7 @@ TEST(Structure, ListsTheUnknownsAndTheirKnowns) {
   for (const std::string& game : {small_game(), vector_centers_game(), outputs_only(small_game())}) {
     const Model model(game);
     for (const Equations equations : {Equations::initial, Equations::running}) {
-      const Dependencies declared = dependencies_of(model, equations);
+      const DependencyTable declared = dependencies_of(model, equations);
       std::set<std::string> listed;
       for (const auto& [unknown, dependencies] : declared) {
         listed.insert(unknown);

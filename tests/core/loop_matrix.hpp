@@ -1,0 +1,29 @@
+// The Jacobian of the loop written out entry by entry, and a dense solver of its Newton systems: the plain way, against
+// which the structured one is judged.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "newton_solver.hpp"
+
+namespace mixed_order_game {
+
+/// One entry of a sparse matrix.
+struct MatrixEntry {
+  int row;
+  int column;
+  Real value;
+};
+
+/// All entries that may differ from zero, each position once. With coupled = false the derivatives of the activations
+/// with respect to the estimates are left out.
+std::vector<MatrixEntry> matrix_of(const LoopJacobian& jacobian, bool coupled);
+
+/// product = J vector, both of the state's length.
+std::vector<Real> product_of(const LoopJacobian& jacobian, const std::vector<Real>& vector);
+
+/// Dense LU of the whole matrix, by Eigen.
+std::unique_ptr<NewtonSolver> make_dense_newton(bool coupled = true);
+
+}  // namespace mixed_order_game
