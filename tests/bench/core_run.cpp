@@ -38,7 +38,6 @@ std::unique_ptr<NewtonSolver> make_solver(const std::string& name, const Shape& 
   if (name == "auto") return make_newton_solver(shape);
   if (name == "structured") return make_structured_newton(true);
   if (name == "structured-uncoupled") return make_structured_newton(false);
-  if (name == "dense") return make_dense_newton(true);
   if (name == "klu") return make_klu_newton(false);
   if (name == "klu-ordered") return make_klu_newton(true);
   throw std::runtime_error("unknown linear solver " + name);
@@ -46,7 +45,7 @@ std::unique_ptr<NewtonSolver> make_solver(const std::string& name, const Shape& 
 
 constexpr const char* usage =
     "usage: core_run GAME --stop S --outputs N --rtol R [--repetitions 1] [--solver auto] [--write FILE]\n"
-    "  solver: auto, structured, structured-uncoupled, dense, klu, klu-ordered\n"
+    "  solver: auto, structured, structured-uncoupled, klu, klu-ordered\n"
     "  FILE receives x and z or v at times 0, S/N, ..., S as doubles, coordinate-major within a row\n";
 
 int run(int count, char** arguments) {
