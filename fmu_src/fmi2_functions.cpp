@@ -169,27 +169,24 @@ fmi2Status fmi2EnterInitializationMode(fmi2Component c) {
 }
 
 fmi2Status fmi2ExitInitializationMode(fmi2Component c) {
-  return status(guarded(c, Call::exit_initialization, "fmi2ExitInitializationMode", [](Component& component) {
-    component.instance.exit_initialization();
-    if (component.logger.tells_events()) {
-      component.logger.event("the run begins at t = " + text_of(component.instance.time()));
-    }
-  }));
+  return status(guarded(
+      c, Call::exit_initialization, "fmi2ExitInitializationMode",
+      [](Component& component) { component.instance.exit_initialization(); },
+      [](const Component& component) { return "the run begins at t = " + text_of(component.instance.time()); }));
 }
 
 fmi2Status fmi2Terminate(fmi2Component c) {
-  return status(guarded(c, Call::terminate, "fmi2Terminate", [](Component& component) {
-    component.instance.terminate();
-    if (component.logger.tells_events()) {
-      const Statistics work = component.instance.statistics();
-      std::string text = "the run ended at t = " + text_of(component.instance.time()) + " after ";
-      if (component.instance.interface() == Interface::co_simulation) {
-        text += std::to_string(work.steps) + " steps, " + std::to_string(work.rate_evaluations) +
-                " evaluations of the rates and ";
-      }
-      component.logger.event(text + std::to_string(work.events) + " events");
-    }
-  }));
+  return status(guarded(
+      c, Call::terminate, "fmi2Terminate", [](Component& component) { component.instance.terminate(); },
+      [](const Component& component) {
+        const Statistics work = component.instance.statistics();
+        std::string text = "the run ended at t = " + text_of(component.instance.time()) + " after ";
+        if (component.instance.interface() == Interface::co_simulation) {
+          text += std::to_string(work.steps) + " steps, " + std::to_string(work.rate_evaluations) +
+                  " evaluations of the rates and ";
+        }
+        return text + std::to_string(work.events) + " events";
+      }));
 }
 
 fmi2Status fmi2Reset(fmi2Component c) {
@@ -245,12 +242,16 @@ fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate* FMUstate) {
 }
 
 fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate FMUstate) {
-  return status(guarded(c, Call::set_state, "fmi2SetFMUstate", [&](Component& component) {
-    if (!component.instance.restore(known_state(component, FMUstate))) {
-      component.logger.event("the state comes from other arithmetic: the integrator restarts from it");
-    }
-    component.last_step_failed = false;
-  }));
+  bool repeated = true;
+  return status(guarded(
+      c, Call::set_state, "fmi2SetFMUstate",
+      [&](Component& component) {
+        repeated = component.instance.restore(known_state(component, FMUstate));
+        component.last_step_failed = false;
+      },
+      [&](const Component&) {
+        return std::string(repeated ? "" : "the state comes from other arithmetic: the integrator restarts from it");
+      }));
 }
 
 fmi2Status fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate* FMUstate) {

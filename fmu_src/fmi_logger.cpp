@@ -13,16 +13,27 @@ std::string harmless(std::string_view text) {
   return clean;
 }
 
-void FmiLogger::error(std::string_view message) const {
-  if (sink_) sink_(Severity::error, error_category, harmless(message).c_str());
+void FmiLogger::error(std::string_view message) const noexcept { tell(Severity::error, error_category, message); }
+
+void FmiLogger::event(std::string_view message) const noexcept {
+  if (tells_events()) tell(Severity::ok, event_category, message);
 }
 
-void FmiLogger::event(std::string_view message) const {
-  if (tells_events()) sink_(Severity::ok, event_category, harmless(message).c_str());
+void FmiLogger::discard(std::string_view message) const noexcept {
+  if (tells_events()) tell(Severity::discard, discard_category, message);
 }
 
-void FmiLogger::discard(std::string_view message) const {
-  if (tells_events()) sink_(Severity::discard, discard_category, harmless(message).c_str());
+void FmiLogger::tell(Severity severity, const char* category, std::string_view message) const noexcept {
+  if (!sink_) return;
+  std::string clean;
+  try {
+    clean = harmless(message);
+  } catch (...) {  // memory is short
+  }
+  try {
+    sink_(severity, category, clean.empty() ? "there is not enough memory" : clean.c_str());
+  } catch (...) {  // nobody is left to be told
+  }
 }
 
 bool FmiLogger::choose(bool on, std::span<const char* const> categories) {

@@ -38,17 +38,21 @@ class FmiLogger {
   /// An empty sink is fine: nothing is said then.
   FmiLogger(Sink sink, bool on) : sink_(std::move(sink)), events_on_(on) {}
 
+  // A message that is empty, or for which there is no memory, says that memory is short.
+
   /// Errors are always told.
-  void error(std::string_view message) const;
-  void event(std::string_view message) const;
+  void error(std::string_view message) const noexcept;
+  void event(std::string_view message) const noexcept;
   /// An integrator tries again with a shorter step, so that this is told together with events.
-  void discard(std::string_view message) const;
+  void discard(std::string_view message) const noexcept;
   [[nodiscard]] bool tells_events() const { return events_on_ && sink_ != nullptr; }
 
   /// No categories mean all. False, and nothing changes, when one of them is unknown.
   bool choose(bool on, std::span<const char* const> categories);
 
  private:
+  void tell(Severity severity, const char* category, std::string_view message) const noexcept;
+
   Sink sink_;
   bool events_on_;
 };

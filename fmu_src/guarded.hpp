@@ -1,5 +1,6 @@
 // The one wrapper around every entry point: checks the instance and that the call is legal now, keeps every exception
-// inside, tells the reason, and keeps the host's floating-point environment out of the calculation and untouched.
+// inside, tells the reason, and keeps the host's floating-point environment out of the calculation and untouched, for
+// its logger too.
 #pragma once
 
 #if defined(__x86_64__)
@@ -13,6 +14,7 @@
 
 #include <exception>
 #include <memory>
+#include <new>
 #include <string>
 #include <unordered_map>
 #include <utility>
@@ -76,22 +78,31 @@ enum class Outcome { done, discarded, refused };
 /// Runs action(). Whatever it throws is told to the logger.
 template <typename Action>
 Outcome contained(const FmiLogger& logger, const char* function, Action action) noexcept {
-  const FloatingPointEnvironment environment;
+  Outcome outcome = Outcome::refused;
+  std::string reason;
   try {
+    const FloatingPointEnvironment environment;
     try {
       action();
       return Outcome::done;
-    } catch (const NotComputable& reason) {
-      logger.discard(std::string(function) + ": " + reason.what());
-      return Outcome::discarded;
+    } catch (const NotComputable& error) {
+      outcome = Outcome::discarded;
+      reason = std::string(function) + ": " + error.what();
+    } catch (const std::bad_alloc&) {
+      reason = std::string(function) + ": there is not enough memory";
     } catch (const std::exception& error) {
-      logger.error(std::string(function) + ": " + error.what());
+      reason = std::string(function) + ": " + error.what();
     } catch (...) {
-      logger.error(std::string(function) + ": an unknown error occurred");
+      reason = std::string(function) + ": an unknown error occurred";
     }
   } catch (...) {  // not even the message could be made
   }
-  return Outcome::refused;
+  if (outcome == Outcome::discarded) {
+    logger.discard(reason);
+  } else {
+    logger.error(reason);
+  }
+  return outcome;
 }
 
 /// Runs action(component) when the call is legal.
@@ -114,6 +125,22 @@ Outcome guarded(void* handle, Call call, const char* function, Action action) no
     }
     action(component);
   });
+}
+
+/// The same; when the call was done and events are told, the text that event(component) makes is one.
+template <typename Action, typename Event>
+Outcome guarded(void* handle, Call call, const char* function, Action action, Event event) noexcept {
+  const Outcome outcome = guarded(handle, call, function, std::move(action));
+  if (outcome != Outcome::done) return outcome;
+  const auto& component = *static_cast<const Component*>(handle);
+  if (!component.logger.tells_events()) return outcome;
+  std::string text;
+  try {
+    text = event(component);
+  } catch (...) {  // memory is short, but the call was done
+  }
+  if (!text.empty()) component.logger.event(text);
+  return outcome;
 }
 
 }  // namespace mixed_order_game

@@ -9,6 +9,7 @@
 #include <memory>
 #include <set>
 #include <sstream>
+#include <stdexcept>
 #include <thread>
 
 #include "errors.hpp"
@@ -533,7 +534,7 @@ TEST(Behaviour25Surroundings, AreUntouchedAndWithoutInfluence) {
   fine = std::max(fine, fmi2GetReal(slave.component, &x, 1, seen.data()));
   const int rounding = std::fegetround();
   const int traps = fegetexcept();
-  const int raised = std::fetestexcept(FE_ALL_EXCEPT & ~FE_INEXACT);
+  const int raised = std::fetestexcept(FE_ALL_EXCEPT);
   fedisableexcept(FE_ALL_EXCEPT);
   std::fesetround(FE_TONEAREST);
   EXPECT_EQ(testing::internal::GetCapturedStdout(), "");
@@ -549,4 +550,85 @@ TEST(Behaviour25Surroundings, AreUntouchedAndWithoutInfluence) {
   EXPECT_EQ(seen[0], expected[x]) << "the host's rounding and traps do not reach the calculation";
   EXPECT_EQ(std::filesystem::current_path(), folder);
   EXPECT_STREQ(std::setlocale(LC_ALL, nullptr), "C");
+}
+
+namespace {
+
+/// What a callback finds.
+struct Surroundings {
+  int rounding = std::fegetround();
+  int traps = fegetexcept();
+  int flags = std::fetestexcept(FE_ALL_EXCEPT);
+  friend bool operator==(const Surroundings&, const Surroundings&) = default;
+};
+
+struct Told {
+  fmi2Status status;
+  Surroundings surroundings;
+};
+
+void record_surroundings(fmi2ComponentEnvironment told, fmi2String, fmi2Status status, fmi2String, fmi2String, ...) {
+  const Surroundings now;
+  static_cast<std::vector<Told>*>(told)->push_back({status, now});
+}
+
+}  // namespace
+
+TEST(Behaviour25Callbacks, OfTheLoggerRunInTheHostsFloatingPointEnvironmentAndOthersNever) {
+  std::vector<Told> told;
+  fmi2CallbackFunctions callbacks{};
+  callbacks.componentEnvironment = &told;
+  callbacks.logger = record_surroundings;
+  callbacks.allocateMemory = [](std::size_t, std::size_t) -> void* { throw std::logic_error("allocateMemory"); };
+  callbacks.freeMemory = [](void*) { throw std::logic_error("freeMemory"); };
+  callbacks.stepFinished = [](fmi2ComponentEnvironment, fmi2Status) { throw std::logic_error("stepFinished"); };
+  const Slave like;
+  const std::string uri = "file://" + resources_of(small_game());
+  const auto make = [&](fmi2Type type, const std::string& guid) {
+    return fmi2Instantiate("name", type, guid.c_str(), uri.c_str(), &callbacks, fmi2False, fmi2True);
+  };
+  const std::size_t states = like.model().variables.states().size();
+  const std::vector<double> huge(states, 1.5e308);
+  std::vector<double> rates(states);
+  const fmi2ValueReference k1 = like.reference("k1");
+  const double negative = -1.0;
+
+  std::feclearexcept(FE_ALL_EXCEPT);
+  std::feraiseexcept(FE_OVERFLOW);
+  ASSERT_EQ(std::fesetround(FE_DOWNWARD), 0);
+  feenableexcept(FE_DIVBYZERO | FE_INVALID);
+  const Surroundings host;
+  const fmi2Component none = make(fmi2CoSimulation, "{another}");
+  const fmi2Component slave = make(fmi2CoSimulation, like.model().guid);
+  fmi2EnterInitializationMode(slave);
+  fmi2ExitInitializationMode(slave);
+  fmi2SetReal(slave, &k1, 1, &negative);
+  const fmi2Status step = fmi2DoStep(slave, 0.0, 1.0, fmi2True);
+  fmi2DoStep(slave, 0.0, 1.0, fmi2True);
+  fmi2Terminate(slave);
+  fmi2FreeInstance(slave);
+  const fmi2Component model = make(fmi2ModelExchange, like.model().guid);
+  fmi2EnterInitializationMode(model);
+  fmi2ExitInitializationMode(model);
+  fmi2EventInfo info{};
+  fmi2NewDiscreteStates(model, &info);
+  fmi2EnterContinuousTimeMode(model);
+  fmi2SetContinuousStates(model, huge.data(), states);
+  const fmi2Status derivatives = fmi2GetDerivatives(model, rates.data(), states);
+  fmi2FreeInstance(model);
+  const Surroundings afterwards;
+  fedisableexcept(FE_ALL_EXCEPT);
+  std::fesetround(FE_TONEAREST);
+  std::feclearexcept(FE_ALL_EXCEPT);
+
+  EXPECT_EQ(none, nullptr);
+  EXPECT_EQ(step, fmi2OK);
+  EXPECT_EQ(derivatives, fmi2Discard);
+  EXPECT_EQ(afterwards, host);
+  std::vector<fmi2Status> statuses;
+  for (const Told& one : told) {
+    statuses.push_back(one.status);
+    EXPECT_EQ(one.surroundings, host) << "message " << statuses.size();
+  }
+  EXPECT_EQ(statuses, (std::vector{fmi2Error, fmi2OK, fmi2Error, fmi2Error, fmi2OK, fmi2OK, fmi2Discard}));
 }
