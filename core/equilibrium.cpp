@@ -71,15 +71,39 @@ class DependentGroups {
   std::vector<int> group_of;
 
  private:
-  void visit(int row) {
+  struct Visit {
+    int row;
+    int next;  // entry of the row to look at
+  };
+
+  /// Depth first, without recursion: a chain of entries would need as many frames on the host's stack.
+  void visit(int first) {
+    std::vector<Visit> visits;
+    begin(first, visits);
+    while (!visits.empty()) {
+      auto& [row, next] = visits.back();
+      if (next < pattern_.start[at(row + 1)]) {
+        const int column = pattern_.column[at(next)];
+        if (number_[at(column)] == 0) {
+          begin(column, visits);  // which looks at the same entry again when it is back
+        } else {
+          if (group_of[at(column)] < 0) lowest_[at(row)] = std::min(lowest_[at(row)], lowest_[at(column)]);
+          ++next;
+        }
+        continue;
+      }
+      if (lowest_[at(row)] == number_[at(row)]) close_group(row);
+      visits.pop_back();
+    }
+  }
+
+  void begin(int row, std::vector<Visit>& visits) {
     lowest_[at(row)] = number_[at(row)] = ++visited_;
     path_.push_back(row);
-    for (int k = pattern_.start[at(row)]; k < pattern_.start[at(row + 1)]; ++k) {
-      const int column = pattern_.column[at(k)];
-      if (number_[at(column)] == 0) visit(column);
-      if (group_of[at(column)] < 0) lowest_[at(row)] = std::min(lowest_[at(row)], lowest_[at(column)]);
-    }
-    if (lowest_[at(row)] != number_[at(row)]) return;
+    visits.push_back({row, pattern_.start[at(row)]});
+  }
+
+  void close_group(int row) {
     const auto first = std::find(path_.begin(), path_.end(), row);
     std::vector<int> group(first, path_.end());
     path_.erase(first, path_.end());

@@ -17,9 +17,9 @@ class ExternalDisturbance {
 
   explicit ExternalDisturbance(int entries);
 
-  [[nodiscard]] int entries() const { return static_cast<int>(polynomial_.size()); }
+  [[nodiscard]] int entries() const { return static_cast<int>(numbers_.size()) / stride; }
   /// The value at the time it was set.
-  [[nodiscard]] Real value(int entry) const { return polynomial_[at(entry)].coefficient[0]; }
+  [[nodiscard]] Real value(int entry) const { return polynomial(entry)[0]; }
   /// Sets a constant.
   void set_value(int entry, Real value);
   /// Sets derivative number order >= 1 [per s^order] of an entry, counted from time t on.
@@ -31,17 +31,19 @@ class ExternalDisturbance {
   void rates(Real t, Real* rate) const;
 
   /// Every number that it consists of, to compare, save and restore: entries() * (highest_derivative + 2).
-  [[nodiscard]] std::span<const Real> numbers() const;
+  [[nodiscard]] std::span<const Real> numbers() const { return numbers_; }
   void set_numbers(std::span<const Real> numbers);
 
  private:
-  struct Polynomial {
-    Real coefficient[highest_derivative + 1] = {};
-    Real since = 0.0;
-  };
+  static constexpr int since = highest_derivative + 1;  // position of the time from which the derivatives count
+  static constexpr int stride = since + 1;
+
+  /// Value, derivatives, since.
+  [[nodiscard]] const Real* polynomial(int entry) const { return numbers_.data() + at(entry) * stride; }
+  [[nodiscard]] Real* polynomial(int entry) { return numbers_.data() + at(entry) * stride; }
   void find_derivatives();
 
-  std::vector<Polynomial> polynomial_;
+  std::vector<Real> numbers_;  // polynomial by polynomial
   bool has_derivatives_ = false;
 };
 

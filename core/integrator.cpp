@@ -4,8 +4,8 @@
 #include <nvector/nvector_serial.h>
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
-#include <cstdio>
 #include <cstdlib>
 #include <cstring>
 #include <exception>
@@ -29,8 +29,8 @@ using Cvode = std::unique_ptr<void, FreeCvode>;
 
 std::string in_seconds(Real t) {
   char text[32];
-  std::snprintf(text, sizeof text, "%.9g s", t);
-  return text;
+  const auto [end, error] = std::to_chars(text, text + sizeof text, t, std::chars_format::general, 9);
+  return std::string(text, end) + " s";
 }
 
 }  // namespace

@@ -492,34 +492,37 @@ Snapshot Instance::read(std::span<const char> bytes) const {
 }
 
 bool Instance::restore(const Snapshot& snapshot) {
-  model_.variables.load(snapshot.settings, settings_);
+  // what may fail and be refused comes before any change
+  Settings settings(model_.game);
+  model_.variables.load(snapshot.settings, settings);
+  std::optional<ModelExchange::Point> point = snapshot.model_exchange;
+  std::unique_ptr<CoSimulation> fresh_run;
+  std::optional<Settings> acting;
+  if (snapshot.co_simulation) {
+    acting.emplace(model_.game);
+    model_.variables.load(snapshot.co_simulation->acting, *acting);
+    if (!co_simulation_) fresh_run = std::make_unique<CoSimulation>(evaluation_);
+  }
+
+  settings_ = std::move(settings);
   experiment_ = snapshot.experiment;
   touched_ = Change::parameters;
   failed_ = false;
   evaluation_.moved();
   evaluation_.costs_changed();
-  bool repeated = true;
-  if (snapshot.co_simulation) {
-    repeated = restore(*snapshot.co_simulation);
-  } else {
+  model_exchange_.reset();
+  if (point) model_exchange_.emplace(evaluation_, std::move(*point));
+  if (!snapshot.co_simulation) {
     co_simulation_.reset();
+    phase_ = snapshot.phase;
+    return true;
   }
-  if (snapshot.model_exchange) {
-    model_exchange_.emplace(evaluation_, *snapshot.model_exchange);
-  } else {
-    model_exchange_.reset();
-  }
-  phase_ = snapshot.phase;
-  return repeated;
-}
-
-bool Instance::restore(const CoSimulation::Point& point) {
-  Settings acting(model_.game);
-  model_.variables.load(point.acting, acting);
-  evaluation_.act(acting);
-  if (!co_simulation_) co_simulation_ = std::make_unique<CoSimulation>(evaluation_);
+  if (fresh_run) co_simulation_ = std::move(fresh_run);
   try {
-    return co_simulation_->restore(point, tolerances());
+    evaluation_.act(*acting);
+    const bool repeated = co_simulation_->restore(*snapshot.co_simulation, tolerances());
+    phase_ = snapshot.phase;
+    return repeated;
   } catch (...) {
     phase_ = Phase::error;
     failed_ = true;

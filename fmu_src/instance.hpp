@@ -100,7 +100,6 @@ class Instance {
   void set_input_derivative(int slot, int order, Real value);
   void check_settings();
   std::span<const Real> event_indicators();
-  bool restore(const CoSimulation::Point& point);
 
   Model model_;
   Interface interface_;

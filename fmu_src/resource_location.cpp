@@ -1,5 +1,6 @@
 #include "resource_location.hpp"
 
+#include <algorithm>
 #include <cstdio>
 #include <memory>
 #ifdef _WIN32
@@ -17,6 +18,11 @@ int hexadecimal(char digit) {
   if (digit >= 'a' && digit <= 'f') return digit - 'a' + 10;
   if (digit >= 'A' && digit <= 'F') return digit - 'A' + 10;
   return -1;
+}
+
+/// Schemes and hosts of a URI have no case; word is in lower case. Without the C library, which follows the locale.
+bool equals_without_case(std::string_view text, std::string_view word) {
+  return std::ranges::equal(text, word, [](char a, char b) { return (a >= 'A' && a <= 'Z' ? a - 'A' + 'a' : a) == b; });
 }
 
 std::string percent_decoded(std::string_view text) {
@@ -48,7 +54,7 @@ std::FILE* open(const std::string& path) { return std::fopen(path.c_str(), "rb")
 std::string path_of(std::string_view resource_location) {
   constexpr std::string_view scheme = "file:";
   if (resource_location.empty()) throw Error("the resource location is empty, expected a file URI");
-  if (!resource_location.starts_with(scheme)) {
+  if (!equals_without_case(resource_location.substr(0, scheme.size()), scheme)) {
     if (resource_location.find("://") != std::string_view::npos) {
       throw Error("the resource location is " + std::string(resource_location) + ", expected a file URI");
     }
@@ -59,7 +65,7 @@ std::string path_of(std::string_view resource_location) {
     rest.remove_prefix(2);
     const std::size_t slash = rest.find('/');
     const std::string_view host = rest.substr(0, slash);
-    if (slash == std::string_view::npos || (!host.empty() && host != "localhost")) {
+    if (slash == std::string_view::npos || (!host.empty() && !equals_without_case(host, "localhost"))) {
       throw Error("the resource location is " + std::string(resource_location) + ", expected a folder of this machine");
     }
     rest.remove_prefix(slash);

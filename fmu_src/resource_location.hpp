@@ -6,7 +6,8 @@
 
 namespace mixed_order_game {
 
-/// file:/p, file:///p, file://localhost/p (percent-encoded UTF-8), or a plain path. Throws Error for any other.
+/// file:/p, file:///p, file://localhost/p (percent-encoded UTF-8; scheme and host in any case), or a plain path. Throws
+/// Error for any other.
 std::string path_of(std::string_view resource_location);
 
 /// The bytes of a file, at most 64 MB. Throws Error naming the file.

@@ -1,7 +1,7 @@
 #include "reference_results.hpp"
 
+#include <charconv>
 #include <cmath>
-#include <cstdio>
 #include <optional>
 #include <pugixml.hpp>
 #include <sstream>
@@ -22,11 +22,13 @@ constexpr std::int64_t most_work = 100'000'000;  // integrator steps times state
 
 void append(std::string& text, Real value) {
   char digits[32];
-  std::snprintf(digits, sizeof digits, "%.10g", value);
-  text += digits;
+  const auto [end, error] = std::to_chars(digits, digits + sizeof digits, value, std::chars_format::general, 10);
+  text.append(digits, end);
 }
 
 std::optional<std::string> simulated(const Model& model) {
+  const std::int64_t states = StateLayout(model.game.parameters.shape).size();
+  if (states > most_states) return std::nullopt;
   const ModelVariables& variables = model.variables;
   std::vector<std::uint32_t> outputs;
   std::string table = "\"time\"";
@@ -36,8 +38,6 @@ std::optional<std::string> simulated(const Model& model) {
     table += ",\"" + variables.name(reference) + '"';
   }
   Instance instance(model, Interface::co_simulation);
-  const std::int64_t states = ClosedLoop(model.game.parameters).layout().size();
-  if (states > most_states) return std::nullopt;
   Experiment experiment;
   experiment.tolerance = reference_tolerance;
   instance.setup_experiment(experiment);

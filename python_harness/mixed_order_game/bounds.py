@@ -4,13 +4,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import lambertw
 
 from .model import Model
 from .parameters import GameParameters
 from .spectrum import consensus_rate, gradient_map, monotonicity_constant, nash_equilibrium
 
-TANH_CONSTANT = 0.2784645427610738
-"""K of the robust term, K = exp(-(K + 1))."""
+TANH_CONSTANT = float(lambertw(np.exp(-1.0)).real)
+"""K of the robust term, K = exp(-(K + 1)): K exp(K) = 1 / e."""
 
 SMALLEST_NEIGHBOURHOOD = 1e-5
 """Floor of derived bounds: far above the integrator's error at the tolerance of the check, 1e-8."""

@@ -1,7 +1,9 @@
 #include "equilibrium.hpp"
 
 #include <gtest/gtest.h>
+#include <pthread.h>
 
+#include <algorithm>
 #include <cmath>
 #include <fstream>
 #include <iterator>
@@ -152,6 +154,41 @@ TEST(NashEquilibrium, OfAPlayerThatFollowsNobodyStandsStill) {
   EXPECT_EQ(along[0], 0.0);
   EXPECT_NEAR(along[1], -0.9 / (2.0 * 9.7), 1e-15);
   EXPECT_NEAR(along[2], (-0.8 + 14.0 * along[1]) / (2.0 * 7.1), 1e-15);
+}
+
+// x_i follows x_{i+1}, the last player stands at 1 / 2: a host's threads can have little stack.
+TEST(NashEquilibrium, OfALongChainNeedsLittleStack) {
+  constexpr int players = 2000;
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+  constexpr std::size_t stack = 1024 * 1024;  // the sanitizers' frames are larger
+#else
+  constexpr std::size_t stack = 64 * 1024;
+#endif
+  QuadraticCost cost(players, 1);
+  std::fill(cost.quadratic.begin(), cost.quadratic.end(), 1.0);
+  for (int i = 0; i + 1 < players; ++i) cost.coupling[at(i * players + i + 1)] = 1e-3;
+  cost.linear.back() = -1.0;
+  cost.refresh();
+  struct Task {
+    const QuadraticCost& cost;
+    Shape shape{.players = players, .dimension = 1, .neurons = 1, .order = std::vector<int>(players, 1)};
+    std::vector<Real> x_star;
+  } task{.cost = cost, .x_star = {}};
+  pthread_attr_t attributes;
+  pthread_attr_init(&attributes);
+  pthread_attr_setstacksize(&attributes, stack);
+  pthread_t thread{};
+  const auto work = [](void* argument) -> void* {
+    auto& given = *static_cast<Task*>(argument);
+    given.x_star = nash_equilibrium(given.cost, given.shape);
+    return nullptr;
+  };
+  ASSERT_EQ(pthread_create(&thread, &attributes, work, &task), 0);
+  pthread_join(thread, nullptr);
+  pthread_attr_destroy(&attributes);
+  ASSERT_EQ(task.x_star.size(), at(players));
+  EXPECT_EQ(task.x_star.back(), 0.5);
+  EXPECT_NEAR(task.x_star[at(players - 2)], 0.5e-3 / 1.001, 1e-15);
 }
 
 TEST(StrongMonotonicity, IsTheSmallestEigenvalueOfTheSymmetricPart) {

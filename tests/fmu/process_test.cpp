@@ -438,12 +438,16 @@ TEST(Behaviour24ResourceLocation, IsDecoded) {
   EXPECT_EQ(path_of("file:///a/b"), "/a/b");
   EXPECT_EQ(path_of("file:/a/b"), "/a/b");
   EXPECT_EQ(path_of("file://localhost/a/b"), "/a/b");
+  EXPECT_EQ(path_of("FILE:///A/b"), "/A/b");
+  EXPECT_EQ(path_of("File:/A/b"), "/A/b");
+  EXPECT_EQ(path_of("file://LocalHost/A/b"), "/A/b");
   EXPECT_EQ(path_of("file:///a%20b/%C3%A9%25"), "/a b/\xC3\xA9%");
   EXPECT_EQ(path_of("file:///a%2"), "/a%2");
   EXPECT_EQ(path_of("file:///100%zz"), "/100%zz");
   EXPECT_EQ(path_of("/a%20b"), "/a%20b") << "a plain path is taken as it is";
   EXPECT_EQ(path_of("a b/c"), "a b/c");
-  for (const char* bad : {"", "http://x/y", "file:", "file://", "file://host", "file://host/x", "file:///%00x"}) {
+  for (const char* bad : {"", "http://x/y", "file:", "file://", "file://host", "file://host/x", "file:///%00x",
+                          "HTTP://x/y", "file://localhosts/x"}) {
     EXPECT_THROW((void)path_of(bad), Error) << bad;
   }
 }
@@ -550,6 +554,31 @@ TEST(Behaviour25Surroundings, AreUntouchedAndWithoutInfluence) {
   EXPECT_EQ(seen[0], expected[x]) << "the host's rounding and traps do not reach the calculation";
   EXPECT_EQ(std::filesystem::current_path(), folder);
   EXPECT_STREQ(std::setlocale(LC_ALL, nullptr), "C");
+}
+
+TEST(Behaviour25Surroundings, ALocaleWithDecimalCommasHasNoInfluence) {
+  const std::string folder = resources_of("title = 'locale'", "locales");
+  output_of("localedef -i de_DE -f UTF-8 '" + folder + "/de_DE.UTF-8' 2> /dev/null");
+  Slave plain;
+  const auto expected = course(plain);
+  Slave exploding(exploding_game());
+  exploding.initialize();
+  exploding.step(0.0, 0.0625);
+  setenv("LOCPATH", folder.c_str(), 1);
+  const bool found = std::setlocale(LC_ALL, "de_DE.UTF-8") != nullptr && std::localeconv()->decimal_point[0] == ',';
+  Slave slave;
+  const auto seen = course(slave);
+  Slave failing(exploding_game());
+  failing.initialize();
+  const fmi2Status failed = failing.step(0.0, 0.0625);
+  const Model again(small_game());
+  std::setlocale(LC_ALL, "C");
+  unsetenv("LOCPATH");
+  if (!found) GTEST_SKIP() << "this machine makes no locale with decimal commas";
+  EXPECT_TRUE(same_values(slave, seen, expected));
+  EXPECT_EQ(failed, fmi2Error);
+  EXPECT_EQ(failing.last_message(), exploding.last_message());
+  EXPECT_EQ(again.guid, plain.model().guid);
 }
 
 namespace {

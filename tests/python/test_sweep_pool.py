@@ -1,18 +1,22 @@
 """Workers that die, here and on a Dask cluster: nothing is lost, and what kills its workers is told."""
 
+import gc
 import os
 import signal
 import subprocess
 import sys
 import time
+import weakref
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from mixed_order_game.sweeping import PoolError, Settings, Sweep, sweep
-from mixed_order_game.sweeping.pool import WORKER_DIED
+from mixed_order_game.sweeping.pool import WORKER_DIED, Case, Source, _loaded, run_chunk
+from mixed_order_game.version import package_version
 from tests.python import sweep_workers
 from tests.python.test_sweep import runs_of
 
@@ -51,6 +55,17 @@ def test_a_row_that_kills_its_workers_is_told(fmu: Path, tmp_path: Path, notes: 
 def test_a_machine_on_which_workers_die_is_told(fmu: Path, tmp_path: Path) -> None:
     with pytest.raises(PoolError, match="10 workers died in a row"):
         sweep(definition(fmu), tmp_path / "s", jobs=2, work=sweep_workers.dies)
+
+
+def test_a_worker_keeps_one_fmu_only(fmu: Path) -> None:
+    source = Source("first", package_version(), path=fmu)
+    kept = []
+    for key in ("first", "second", "third", "third"):
+        run_chunk(replace(source, key=key), SHORT, [Case(0, {"k1": 5.0})])
+        kept.append(weakref.ref(_loaded.sampler[1]))
+    gc.collect()
+    assert [sampler() is not None for sampler in kept] == [False, False, True, True]
+    assert kept[2]() is kept[3]()
 
 
 def test_workers_leave_nothing_behind(fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -100,6 +100,7 @@ def _sampler(source: Source) -> Sampler:
         return held[1]
     if held is not None:
         held[1].close()
+        atexit.unregister(held[1].close)
         _loaded.sampler = None
     if source.path is not None:
         sampler = Sampler(source.path)
