@@ -3,8 +3,11 @@
 Exit codes: 0 fine; 1 a check failed, or an error told in one sentence on stderr; 2 wrong usage.
 """
 
+import codecs
+import io
 import json
 import math
+import sys
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from enum import StrEnum
@@ -18,7 +21,8 @@ from .analysis.command import register as register_analyse
 from .authoring.command import register as register_authoring
 from .build import SOURCE_OR_RESULT, fmu_of, game_file
 from .compare_command import register as register_compare
-from .errors import MixedOrderGameError
+from .errors import MixedOrderGameError, reason
+from .reading import suffix_of
 from .reporting.command import register as register_report
 from .shared_options import ForceOption, ToleranceOption, output_option
 from .sweep_command import register as register_sweep
@@ -350,8 +354,17 @@ register_tune(app)
 
 
 def main() -> None:
-    """Entry point of the command."""
-    app()
+    """Entry point of the command, on any console."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):  # characters that it lacks are shown as \\uXXXX, not fatal
+            utf8 = codecs.lookup(stream.encoding).name == "utf-8"
+            stream.reconfigure(errors="surrogateescape" if utf8 else "backslashreplace")
+    try:
+        app()
+    except OSError as error:  # mostly of a full disk behind standard output
+        where = f"{error.filename}: " if error.filename else ""
+        sys.stderr.write(f"mog: {where}{reason(error)}\n")
+        sys.exit(1)
 
 
 def _report(verdict: "Validation", *, as_json: bool) -> None:

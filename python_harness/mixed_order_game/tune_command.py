@@ -77,7 +77,7 @@ def tune(
     fmu = fmu_of(game)
     chosen = graphs_option(graphs or [], read_model(fmu), seed) or None
     console = Console(stderr=True)
-    with console.status("tuning") as status:
+    with console.status("tuning", spinner="line") as status:
         found = search(
             fmu,
             settling_time,

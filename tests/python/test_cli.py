@@ -209,6 +209,40 @@ def test_demo(fmu: Path, tmp_path: Path) -> None:
     sentence(mog("demo", "--fmu", fmu, "--output", tmp_path / "file"))
 
 
+@pytest.mark.parametrize(
+    ("console", "title", "byte"),
+    [
+        ({"PYTHONIOENCODING": "cp1252"}, b"\\u4e94 Fahrz\xfcge", b"\\udcff"),
+        ({"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}, b"\\u4e94 Fahrz\\xfcge", b"\\udcff"),
+        ({"PYTHONIOENCODING": "utf-8"}, "五 Fahrzüge".encode(), b"\xff"),
+    ],
+)
+def test_any_title_and_path_on_any_console(
+    console: dict[str, str], title: bytes, byte: bytes, tmp_path: Path
+) -> None:
+    """Characters that the console lacks are shown as codes; bytes of a file's name that are no text stay."""
+    cache = os.fsencode(tmp_path) + b"/\xff"
+    game = tmp_path / "game.toml"
+    text = default_game().read_text(encoding="utf-8")
+    game.write_text(text.replace("Connectivity control of five vehicles", "五 Fahrzüge"), encoding="utf-8")
+    done = subprocess.run(
+        [sys.executable, "-m", "mixed_order_game", "info", str(game)],
+        capture_output=True,
+        env={**os.environ, "XDG_CACHE_HOME": os.fsdecode(cache), "COLUMNS": "300", **console},
+        check=False,
+    )
+    assert (done.returncode, done.stderr) == (0, b"")
+    assert title in done.stdout
+    assert b"/" + byte + b"/mixed-order-game/" in done.stdout
+
+
+def test_output_that_takes_no_more(fmu: Path) -> None:
+    command = [sys.executable, "-m", "mixed_order_game", "info", str(fmu)]
+    with Path("/dev/full").open("wb") as full:
+        done = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, check=False)
+    assert (done.returncode, done.stderr) == (1, b"mog: no space left on device\n")
+
+
 def test_results_are_the_same_in_any_locale_and_folder(fmu: Path, tmp_path: Path) -> None:
     outputs = []
     for name, language in (("a", "C"), ("b", "de_DE.UTF-8")):

@@ -76,5 +76,5 @@ def _progress() -> Iterator[Callable[[str, float], None]]:
     if not console.is_terminal:
         yield lambda _name, _part: None
         return
-    with console.status("analysing") as status:
+    with console.status("analysing", spinner="line") as status:
         yield lambda name, _part: status.update(name)
