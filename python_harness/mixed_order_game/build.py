@@ -11,14 +11,17 @@ import platform
 import shutil
 import subprocess
 import sys
-import tempfile
+import zipfile
+import zlib
 from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from .errors import BuildError, GameError, ResultError, reason
 from .packaging import PackagingError, write_fmu
 from .reading import expect_file, suffix_of
-from .writing import FMU, check_output, write_file
+from .temporary import HINT, explained, folder_of_process, temporary_folder
+from .writing import FMU, check_folder, check_output, write_file, write_whole
 
 DEFAULT_GAME = "five_vehicles"
 """The paper's example."""
@@ -46,15 +49,24 @@ def build_fmu(
     expect_file(game, "game file", GameError)
     try:
         check_output(output, FMU, inputs=[game], force=force)
+        with _archive(game, arm_linux=arm_linux) as archive, archive.open("rb") as made:
+            return write_file(
+                output, FMU, lambda file: shutil.copyfileobj(made, file), inputs=[game], force=force
+            )
     except ResultError as error:
         raise BuildError(str(error)) from error
+
+
+@contextmanager
+def _archive(game: Path, *, arm_linux: bool | None = None) -> Iterator[Path]:
+    """The FMU of a game in a temporary folder. Raises as build_fmu does."""
     native = native_directory()
-    with tempfile.TemporaryDirectory(prefix="mixed-order-game-") as folder:
-        archive, description = Path(folder) / "game.fmu", Path(folder) / "modelDescription.xml"
-        extra = Path(folder) / "extra"
-        extra.mkdir()
-        _describe(game, description, extra)
+    with temporary_folder(BuildError) as folder:
+        archive, description = folder / "game.fmu", folder / "modelDescription.xml"
+        extra = folder / "extra"
         try:
+            extra.mkdir()
+            _describe(game, description, extra)
             write_fmu(
                 archive,
                 model_description=description,
@@ -67,14 +79,11 @@ def build_fmu(
                 icon=native / "model.png",
                 extra=extra,
             )
-            with archive.open("rb") as made:
-                return write_file(
-                    output, FMU, lambda file: shutil.copyfileobj(made, file), inputs=[game], force=force
-                )
-        except (PackagingError, OSError) as error:
-            raise BuildError(f"cannot write {output}: {reason(error)}") from error
-        except ResultError as error:
-            raise BuildError(str(error)) from error
+        except PackagingError as error:
+            raise BuildError(f"cannot make the FMU of {game}: {error}") from error
+        except OSError as error:
+            raise BuildError(f"cannot make the FMU of {game}: {explained(error, folder)}") from error
+        yield archive
 
 
 def default_fmu() -> Path:
@@ -89,7 +98,8 @@ def cached_fmu(game: Path | str) -> Path:
     """The FMU of a game file, or of a game of the package by its name, kept in the user's cache folder.
 
     The entry's name holds a fingerprint of the game, the compiled parts and the documentation, so that a
-    changed file gives a new FMU. Raises as build_fmu does.
+    changed file gives a new FMU; a damaged entry is made again. Where the cache cannot be written, the FMU
+    lies in a temporary folder until the process ends. Raises as build_fmu does.
     """
     import platformdirs
 
@@ -101,8 +111,32 @@ def cached_fmu(game: Path | str) -> Path:
     for path in sorted(path for path in native.rglob("*") if path.is_file()):
         fingerprint.update(path.relative_to(native).as_posix().encode() + b"\0" + path.read_bytes())
     cache = platformdirs.user_cache_path("mixed-order-game")
-    output = cache / fingerprint.hexdigest()[:16] / "MixedOrderGame.fmu"
-    return output if output.is_file() else build_fmu(game, output, force=True)
+    entry = Path(fingerprint.hexdigest()[:16]) / "MixedOrderGame.fmu"
+    if cache.is_absolute():  # it is not where nobody's home is known
+        with suppress(ResultError):  # of a cache that is full, read-only or another user's
+            return _kept(game, cache / entry)
+    try:
+        return _kept(game, folder_of_process() / entry)
+    except ResultError as error:
+        raise BuildError(f"{error}; {HINT}") from error
+
+
+def _kept(game: Path, output: Path) -> Path:
+    """The FMU of a game at a place of our own. Raises ResultError if it cannot be written there."""
+    if not _intact(output):
+        check_folder(output.parent)
+        with _archive(game) as archive, archive.open("rb") as made:
+            write_whole(output, lambda file: shutil.copyfileobj(made, file))
+    return output
+
+
+def _intact(fmu: Path) -> bool:
+    """Whether there is an archive of which no part is missing or damaged."""
+    try:
+        with zipfile.ZipFile(fmu) as archive:
+            return archive.testzip() is None
+    except (OSError, EOFError, RuntimeError, ValueError, zipfile.BadZipFile, zlib.error):
+        return False
 
 
 def default_game() -> Path:
@@ -215,7 +249,10 @@ def _describe(game: Path, output: Path, extra: Path) -> None:
         )
     except OSError as error:
         raise BuildError(f"cannot run {tool}: {reason(error)}") from error
+    said = " ".join(finished.stderr.split())
+    if said.startswith((f"{TOOL}: cannot write", f"{TOOL}: filesystem error")):
+        raise BuildError(f"{said}; {HINT}")
     if finished.returncode == 1:
-        raise GameError(" ".join(finished.stderr.split()))
+        raise GameError(said)
     if finished.returncode != 0 or not output.is_file():
         raise BuildError(f"{tool.name} ended with status {finished.returncode}: {finished.stderr.strip()}")

@@ -22,7 +22,6 @@ from .authoring.command import register as register_authoring
 from .build import SOURCE_OR_RESULT, fmu_of, game_file
 from .compare_command import register as register_compare
 from .errors import MixedOrderGameError, reason
-from .reading import suffix_of
 from .reporting.command import register as register_report
 from .shared_options import ForceOption, ToleranceOption, output_option
 from .sweep_command import register as register_sweep

@@ -4,12 +4,14 @@ fmpy.simulate_fmu is not used: a Simulator keeps its instance between runs (rese
 variable, reports progress, sets inputs and tunable parameters on the way and turns the FMU's log into errors.
 """
 
+import os
 import shutil
-import tempfile
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from ctypes import POINTER, c_double, c_int, c_uint
 from itertools import pairwise
 from pathlib import Path
+from threading import Lock
 from types import TracebackType
 from typing import Any, Self, cast
 
@@ -23,6 +25,8 @@ from .errors import SimulationError
 from .model import Model, Value, Variable, check_value, read_model
 from .results import Result
 from .schedule import Disturbance
+from .temporary import explained, new_folder
+from .turn import Turn, in_turn
 from .version import package_version
 
 Inputs = Disturbance | Callable[[float], ArrayLike] | ArrayLike
@@ -34,6 +38,8 @@ Changes = Mapping[float, Mapping[str, Value]]
 
 Progress = Callable[[float], None]
 """Called with the time reached, in s, after every step."""
+
+_loading = Lock()
 
 LARGEST_SAMPLES = 10_000_000
 LEFT_OUT = ("y", "W")
@@ -68,8 +74,21 @@ def run(
         )
 
 
+@contextmanager
+def _in_place() -> Iterator[None]:
+    """Keep the working directory: fmpy changes it while it loads a library, and for good when that fails."""
+    with _loading:
+        here = os.getcwd()  # noqa: PTH109
+        try:
+            yield
+        finally:
+            os.chdir(here)
+
+
 class Simulator:
     """One FMU, unpacked and loaded once, run as often as wanted. Use it in a with statement.
+
+    Threads that share one wait for each other; to run at the same time each needs its own.
 
     fmu: a file (.fmu), or a game, of which it is made on first use: a game file (.toml), a game of the
     package by its name, or None for the paper's example.
@@ -79,26 +98,29 @@ class Simulator:
     def __init__(self, fmu: Path | str | None = None) -> None:
         self.model: Model = read_model(fmu)
         self._messages: list[tuple[int, str]] = []
-        self._folder = Path(tempfile.mkdtemp(prefix="mixed-order-game-"))
+        self._turn = Turn()
+        self._process = os.getpid()
         self._slave: Any = None
+        self._folder = new_folder(SimulationError)
         try:
             fmpy.extract(str(self.model.path), unzipdir=self._folder)
             self._callbacks = fmi2CallbackFunctions()
             self._callbacks.logger = fmi2CallbackLoggerTYPE(self._log)
             self._callbacks.allocateMemory = defaultCallbacks.allocateMemory
             self._callbacks.freeMemory = defaultCallbacks.freeMemory
-            slave = FMU2Slave(
-                guid=self.model.guid,
-                modelIdentifier="MixedOrderGame",
-                unzipDirectory=str(self._folder),
-                instanceName="mixed_order_game",
-            )
+            with _in_place():
+                slave = FMU2Slave(
+                    guid=self.model.guid,
+                    modelIdentifier="MixedOrderGame",
+                    unzipDirectory=str(self._folder),
+                    instanceName="mixed_order_game",
+                )
             slave.instantiate(callbacks=self._callbacks)
             self._slave = slave
         except Exception as error:  # fmpy raises bare Exceptions
+            said = self._said() or explained(error, self._folder)
             self.close()
-            said = self._said()
-            raise SimulationError(f"{self.model.path} cannot be loaded: {said or error}") from error
+            raise SimulationError(f"{self.model.path} cannot be loaded: {said}") from error
         self._used = False
 
     def __enter__(self) -> Self:
@@ -110,12 +132,23 @@ class Simulator:
         self.close()
 
     def close(self) -> None:
-        """Free the instance and remove the unpacked files. Closing twice is allowed."""
+        """Free the instance and remove the unpacked files. Closing twice is allowed.
+
+        In a forked process the files are its parent's and stay. Raises SimulationError from within a run.
+        """
+        if os.getpid() != self._process:
+            self._slave = None
+            return
+        self._free()
+
+    @in_turn
+    def _free(self) -> None:
         if self._slave is not None:
             self._slave.freeInstance()
             self._slave = None
         shutil.rmtree(self._folder, ignore_errors=True)
 
+    @in_turn
     def run(
         self,
         *,

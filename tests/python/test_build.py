@@ -1,6 +1,9 @@
 """FMUs of games: reproducible, one binary for every game, and bad games refused in one sentence."""
 
+import errno
+import os
 import shutil
+import tempfile
 import zipfile
 from pathlib import Path
 
@@ -9,6 +12,8 @@ import pytest
 from mixed_order_game import (
     BuildError,
     GameError,
+    SimulationError,
+    Simulator,
     build,
     build_fmu,
     cached_fmu,
@@ -16,6 +21,7 @@ from mixed_order_game import (
     default_game,
     read_model,
 )
+from mixed_order_game.temporary import folder_of_process
 from tests.conftest import GAMES
 
 
@@ -74,11 +80,88 @@ def test_cache(fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> No
     first = default_fmu()
     assert first.is_relative_to(tmp_path)
     assert first.read_bytes() == fmu.read_bytes()
-    monkeypatch.setattr(build, "build_fmu", None)
+    monkeypatch.setattr(build, "_archive", None)
     assert default_fmu() == first
     monkeypatch.undo()
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     assert cached_fmu(GAMES / "two_scalar_players.toml") != first
+
+
+@pytest.mark.parametrize("damage", ["truncated", "changed", "empty", "folder"])
+def test_a_damaged_entry_of_the_cache_is_made_again(
+    damage: str, fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    entry, content = default_fmu(), fmu.read_bytes()
+    middle = len(content) // 2
+    if damage == "folder":
+        entry.unlink()
+        (entry / "inside").mkdir(parents=True)
+        elsewhere = default_fmu()
+        assert elsewhere != entry
+        entry = elsewhere
+    else:
+        damaged = {"truncated": content[:middle], "empty": b""}
+        changed = content[:middle] + bytes(100) + content[middle + 100 :]
+        entry.write_bytes(damaged.get(damage, changed))
+        assert default_fmu() == entry
+    assert entry.read_bytes() == content
+
+
+def test_a_cache_that_cannot_be_written(fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The FMU lies in a temporary folder as long as the process lives."""
+    (tmp_path / "file").write_text("")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file" / "cache"))
+    made = default_fmu()
+    assert made.is_relative_to(folder_of_process())
+    assert made == default_fmu()
+    assert made.read_bytes() == fmu.read_bytes()
+    with monkeypatch.context() as patch:
+        patch.setattr(build, "write_fmu", no_space)
+        assert default_fmu() == made
+        with pytest.raises(
+            BuildError, match=r"cannot make the FMU of .* is full; set the environment variable TMPDIR"
+        ):
+            cached_fmu(GAMES / "two_scalar_players.toml")
+
+
+def no_space(*_: object, **__: object) -> None:
+    raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+
+@pytest.mark.parametrize(
+    ("error", "told"),
+    [
+        (OSError(errno.ENOSPC, "No space left on device"), "is full; set the environment variable TMPDIR"),
+        (
+            Exception("Failed to load shared library"),
+            "is mounted noexec, so that no library in it can be loaded",
+        ),
+        (OSError(errno.EACCES, "Permission denied", "/x"), "cannot be loaded: permission denied"),
+    ],
+)
+def test_temporary_folders_that_are_of_no_use(
+    error: Exception, told: str, fmu: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(*_: object, **__: object) -> None:
+        raise error
+
+    monkeypatch.setattr("fmpy.extract", refuse)
+    monkeypatch.setattr("mixed_order_game.temporary._runs_nothing", lambda _: True)
+    with pytest.raises(SimulationError) as refused:
+        Simulator(fmu)
+    assert str(refused.value).startswith(f"{fmu} cannot be loaded: ")
+    assert told in str(refused.value)
+
+
+def test_no_place_for_temporary_files(fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "none"))
+    with pytest.raises(
+        SimulationError, match=r"no place for temporary files: .*; set the environment variable"
+    ):
+        Simulator(fmu)
+    with pytest.raises(BuildError, match="no place for temporary files"):
+        build_fmu(default_game(), tmp_path / "a.fmu")
 
 
 @pytest.mark.parametrize("name", sorted(build.shipped_games()))

@@ -1,15 +1,15 @@
 """The analysis of a game file or an FMU, as a function."""
 
 import math
-import tempfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
 from ..build import build_fmu, cached_fmu, source_of
-from ..errors import GameError
+from ..errors import BuildError, GameError
 from ..model import Value
 from ..reading import suffix_of
+from ..temporary import temporary_folder
 from .analyst import Analyst, Progress
 from .findings import Analysis
 from .game import AnalysedGame, game_from_tables, read_game, toml_text, without_square
@@ -59,8 +59,8 @@ def _opened(
     if not needs_fmu:
         yield game_from_tables(tables, path), None
         return
-    with tempfile.TemporaryDirectory(prefix="mixed-order-game-") as folder:
-        derived = Path(folder) / "game.toml"
+    with temporary_folder(BuildError) as folder:
+        derived = folder / "game.toml"
         derived.write_text(toml_text(tables), encoding="utf-8")
         fmu = build_fmu(derived, derived.with_suffix(".fmu"))
         yield read_game(fmu, changes), fmu if simulation else None

@@ -17,6 +17,7 @@ from ..metrics import Metrics, changed_values, sample_times, sampled_metrics
 from ..model import Value, check_value
 from ..results import Result
 from ..run import Simulator
+from ..turn import in_turn
 from ..version import package_version
 
 FloatArray = NDArray[np.float64]
@@ -67,6 +68,7 @@ class Sampler(Simulator):
         self._block = self._signals([f"{stem}[{i},{k}]" for stem in ("x", "u") for i, k in self._entries])
         self._equilibrium = self._signals([f"x_star[{i},{k}]" for i, k in self._entries])
 
+    @in_turn
     def measure(self, values: Mapping[str, Value], settings: Settings) -> Metrics:
         """Figures of the run with these start values. Raises VariableError, SimulationError as run does."""
         time = sample_times(settings.stop_time, settings.step)
@@ -76,6 +78,7 @@ class Sampler(Simulator):
             time, x - x_star, u, events=events, band=settings.band, settle_time=settings.settle_time
         )
 
+    @in_turn
     def record(self, values: Mapping[str, Value], settings: Settings) -> Result:
         """The same run as a Result with x, u, x_star and solver_events, on the times of measure."""
         time = sample_times(settings.stop_time, settings.step)
