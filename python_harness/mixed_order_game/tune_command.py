@@ -52,6 +52,10 @@ def tune(
     ] = None,
     settings: SettingsOption = None,
     band: BandOption = None,
+    largest_error: Annotated[
+        float | None,
+        typer.Option(min=0.0, help="Largest |x - x*| in the last fifth of the runs.", show_default="any"),
+    ] = None,
     stop_time: Annotated[
         float | None, typer.Option(help="End of the runs in s.", show_default="4 times the wish, at least 2")
     ] = None,
@@ -86,6 +90,7 @@ def tune(
             ranges=boxes,
             start_values=fixed,
             band=band,
+            largest_error=largest_error,
             stop_time=stop_time,
             seed=seed,
             jobs=jobs,
@@ -96,7 +101,10 @@ def tune(
     else:
         _print(found)
     if not found.met:
-        typer.echo(f"mog: no gains in the ranges were found to settle within {found.wish:g} s", err=True)
+        wishes = "" if found.settles else f" to settle within {found.wish:g} s"
+        if not found.exact:
+            wishes += f"{' and' if wishes else ''} to end within {found.largest_error:g} of the equilibrium"
+        typer.echo(f"mog: no gains in the ranges were found{wishes}", err=True)
         raise typer.Exit(1)
 
 
@@ -124,4 +132,6 @@ def _print(found: "Tuned") -> None:
         else f"on the slowest of {count} graphs, {found.graphs[found.worst].label}"
     )
     console.print(Text(f"figures {where}; {found.simulations} simulations"))
+    for note in found.notes:
+        console.print(Text(f"note: {note}"))
     console.print(Text("use: " + " ".join(f"--set {name}={value:g}" for name, value in found.gains.items())))

@@ -6,8 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy.linalg import expm
+from typer.testing import CliRunner
 
 from mixed_order_game import read_model
+from mixed_order_game.cli import app
 from mixed_order_game.designs import Range
 from mixed_order_game.errors import VariableError
 from mixed_order_game.graphs import GraphError, graphs_of_text
@@ -65,6 +67,10 @@ def test_gains_on_the_games_own_graph(fmu: Path) -> None:
     assert before is not None
     assert found.control_energy < 0.5 * before.control_energy
     assert found.as_json()["met"] is True
+    # And of a larger error at the end, which is told.
+    assert found.metrics[0].final_error > 2.0 * before.final_error
+    ratio = found.metrics[0].final_error / before.final_error
+    assert [note for note in found.notes if f" is {ratio:.3g} times that before" in note]
 
 
 def test_gains_on_several_graphs_with_more_gains(fmu: Path) -> None:
@@ -86,6 +92,29 @@ def test_wish_that_cannot_be_met(fmu: Path) -> None:
     assert not found.met
     assert found.settling_time > 0.5
     assert 1.0 <= found.gains["k1"] <= 2.0
+    assert found.at_limits == {"k1": 2.0, "k2": 0.2}
+    assert found.notes[1].startswith("k2 = 0.2 lies at an end of its range, 0.1 to 0.2")
+
+
+def test_largest_error(fmu: Path) -> None:
+    """Kept where it can be; where it cannot, the gains are not called good although they settle in time."""
+    found = tune(fmu, 1.0, gains=["k1", "k2"], largest_error=0.005, seed=1)
+    assert found.met
+    assert found.metrics[0] is not None
+    assert found.metrics[0].final_error == found.final_error <= 0.005
+    hopeless = replace(found, largest_error=1e-6)
+    assert (hopeless.met, hopeless.settles, hopeless.exact) == (False, True, False)
+    with Sampler(fmu) as sampler:
+        proof = sampler.measure(found.gains, Settings(stop_time=4.0))
+    assert proof == found.metrics[0]
+
+
+def test_command_names_the_wish_that_is_missed(fmu: Path) -> None:
+    options = ["--settling-time", "1", "--gains", "k2", "--range", "k2=0.9:1.1", "--largest-error", "1e-5"]
+    done = CliRunner(env={"COLUMNS": "200"}).invoke(app, ["tune", str(fmu), *options])
+    assert done.exit_code == 1
+    assert done.stderr == "mog: no gains in the ranges were found to end within 1e-05 of the equilibrium\n"
+    assert "lies at an end of its range, 0.9 to 1.1" in done.stdout
 
 
 @pytest.mark.parametrize(
@@ -93,6 +122,7 @@ def test_wish_that_cannot_be_met(fmu: Path) -> None:
     [
         ({"settling_time": 0.0}, TuneError, "0 s is not positive"),
         ({"stop_time": 0.5}, TuneError, "cannot show"),
+        ({"largest_error": 0.0}, TuneError, "largest error 0 is not positive"),
         ({"gains": []}, TuneError, "every gain"),
         ({"gains": ["k1", "k1"]}, TuneError, "once"),
         ({"gains": ["rho"]}, TuneError, "rho is not a gain"),
