@@ -291,6 +291,7 @@ def plot(
     )
     from .results import load
     from .run import Simulator
+    from .validate import PLAIN_TOLERANCE, TOLERANCE
     from .writing import FIGURE, RESULT
 
     inches = PAGE_WIDTH if width is FigureWidth.PAGE else COLUMN_WIDTH
@@ -309,9 +310,11 @@ def plot(
             paths = judged(paper_figure_names(simulator.model))
             robust, plain = (
                 simulator.run(
-                    start_values={"robust": on, "perturbed": on}, stop_time=simulator.model.stop_time
+                    start_values={"robust": on, "perturbed": on},
+                    stop_time=simulator.model.stop_time,
+                    tolerance=tolerance,
                 )
-                for on in (True, False)
+                for on, tolerance in ((True, TOLERANCE), (False, PLAIN_TOLERANCE))
             )
         figures = paper_figures(robust, plain, width=inches)
     for name, axes in figures.items():

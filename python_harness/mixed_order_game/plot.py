@@ -17,7 +17,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
-from .errors import PlotError
+from .errors import PlotError, ResultError
 from .model import Model
 from .names import parse_name
 from .reading import suffix_of
@@ -50,7 +50,13 @@ SHORT_TRANSIENT = 0.2
 SMALLEST_INSET = 0.25
 """Least height of the inset, as a part of the axes."""
 
-EQUILIBRIUM = "0.45"
+EQUILIBRIUM, EARLIER = "0.45", "0.6"
+
+SMALLEST_ERROR = 1e-17
+"""Errors below are drawn at it: a logarithmic axis has no 0."""
+
+BELOW_FLOOR = 1e-2
+"""Part of the integrator's tolerance at which a logarithmic axis ends."""
 
 SECOND_ORDER = 2
 
@@ -89,13 +95,15 @@ def paper_style() -> AbstractContextManager[None]:
 def plot_positions(result: Result, axes: Axes | None = None, *, width: float = COLUMN_WIDTH) -> Axes:
     """Actions x_il over time, one line each, and their equilibrium as thin lines. width in inches.
 
-    Raises ResultError if x was not recorded.
+    The equilibrium is that of each time, with steps where costs change. Raises ResultError if x was not
+    recorded.
     """
     with paper_style():
         axes = axes or new_axes(width)
         _lines(axes, result, "x")
-        for level in np.unique(np.round(result.x_star, 12)):
-            axes.axhline(level, color=EQUILIBRIUM, linewidth=0.6, zorder=1)
+        levels = np.round(result.equilibria.reshape(len(result.time), -1), 12)
+        for level in np.unique(levels, axis=1).T:
+            axes.plot(result.time, level, color=EQUILIBRIUM, linewidth=0.6, zorder=1, drawstyle="steps-pre")
         _over_time(axes, "action $x_{il}$" + _unit(result, "x"))
         _inset(axes, result, "x")
         _legend(axes, range(result.players), result, equilibrium=True)
@@ -124,22 +132,43 @@ def plot_error(
 ) -> Axes:
     """Distance to the equilibrium, |x - x*|_2, on a logarithmic axis; one line a labelled result.
 
+    Shaded in a line's colour is what lies within the integrator's tolerance, where that line goes there.
     Raises ResultError if nash_error was not recorded.
     """
     labelled = {"": results} if isinstance(results, Result) else results
+    floors: dict[float, Any] = {}
     with paper_style():
         axes = axes or new_axes(width)
         for (label, result), colour in zip(labelled.items(), _colours(len(labelled)), strict=True):
-            error = np.where(result.nash_error > 0.0, result.nash_error, np.nan)
-            axes.plot(result.time, error, color=colour, label=label)
+            axes.plot(result.time, np.maximum(result.nash_error, SMALLEST_ERROR), color=colour, label=label)
+            floor = integrator_floor(result)
+            if result.nash_error.min() < floor:
+                floors[floor] = EQUILIBRIUM if floor in floors else colour
         axes.set_yscale("log")
+        if floors:
+            bottom = BELOW_FLOOR * min(floors)
+            axes.set_ylim(bottom=bottom)
+            for floor, colour in floors.items():
+                axes.axhspan(
+                    bottom, floor, color=colour, alpha=0.15, linewidth=0.0, label="integrator's tolerance"
+                )
         first = next(iter(labelled.values()))
         _over_time(axes, r"error $\Vert x - x^*\Vert_2$" + _unit(first, "x"))
-        if any(labelled):
-            _above(
-                axes, *axes.get_legend_handles_labels(), columns=1 if width < TWO_COLUMNS else len(labelled)
-            )
+        handles, labels = axes.get_legend_handles_labels()
+        named = [k for k, label in enumerate(labels) if label]
+        if named:
+            columns = 1 if width < TWO_COLUMNS else len(named)
+            _above(axes, [handles[k] for k in named], [labels[k] for k in named], columns=columns)
     return axes
+
+
+def integrator_floor(result: Result) -> float:
+    """2-norm of what the integrator's tolerance allows as error of actions at x*; NaN if it is unknown."""
+    relative = float(result.parameters.get("tolerance_relative") or result.tolerance)
+    absolute = float(result.parameters.get("tolerance_absolute") or 0.01 * relative)
+    if np.isnan(relative):
+        return float("nan")
+    return float(np.linalg.norm(relative * np.abs(result.equilibria) + absolute, axis=(1, 2)).max())
 
 
 def plot_plane(
@@ -151,6 +180,7 @@ def plot_plane(
 ) -> Axes:
     """Paths of the players in the plane (D = 2), with the communication graph between their starts.
 
+    Where costs change, the equilibria before the last one are drawn too, in grey.
     edges: (i, j, weight), 1-based; by default those among the result's parameters, none if it has no
     parameters. width in inches. Raises PlotError unless D = 2, ResultError if x was not recorded.
     """
@@ -176,7 +206,9 @@ def plot_plane(
                     va="center",
                     zorder=4,
                 )
-        axes.plot(*result.x_star.T, color="black", marker="x", markersize=5.0, linestyle="none", zorder=5)
+        earlier = earlier_equilibria(result)
+        for points, colour in ((earlier, EARLIER), (result.x_star, "black")):
+            axes.plot(*points.T, color=colour, marker="x", markersize=5.0, linestyle="none", zorder=5)
         axes.set_aspect("equal", adjustable="datalim")
         axes.set_xlabel("$x_{i1}$" + _unit(result, "x"))
         axes.set_ylabel("$x_{i2}$" + _unit(result, "x"))
@@ -185,7 +217,10 @@ def plot_plane(
             "path": Line2D([], [], color="0.3"),
             "communication": Line2D([], [], color="0.75", linewidth=0.8),
             "equilibrium": Line2D([], [], color="black", marker="x", markersize=5.0, linestyle="none"),
+            "equilibrium before": Line2D([], [], color=EARLIER, marker="x", markersize=5.0, linestyle="none"),
         }
+        if not len(earlier):
+            del keys["equilibrium before"]
         if not any(line.get_gid() == "edge" for line in axes.lines):
             del keys["communication"]
         _above(axes, list(keys.values()), list(keys), columns=2 if width < TWO_COLUMNS else len(keys))
@@ -220,14 +255,19 @@ def paper_figures(robust: Result, plain: Result, *, width: float = COLUMN_WIDTH)
 
 
 def result_figures(result: Result, *, width: float = COLUMN_WIDTH) -> dict[str, Axes]:
-    """Every figure that one result allows, by file name."""
-    figures = {"positions": plot_positions(result, width=width)}
-    if _second_order(result):
+    """Every figure that one result allows, by file name. Raises ResultError if it allows none."""
+    recorded = {parse_name(name)[0] for name in result.columns}
+    figures = {}
+    if "x" in recorded:
+        figures["positions"] = plot_positions(result, width=width)
+    if "v" in recorded:
         figures["velocities"] = plot_velocities(result, width=width)
-    if "nash_error" in result.columns:
+    if "nash_error" in recorded:
         figures["error"] = plot_error(result, width=width)
-    if result.dimension == PLANE:
+    if "x" in recorded and result.dimension == PLANE:
         figures["plane"] = plot_plane(result, width=width)
+    if not figures:
+        raise ResultError("there is nothing to draw: none of x, v and nash_error was recorded")
     return figures
 
 
@@ -278,6 +318,12 @@ def edges_of(result: Result) -> list[tuple[int, int, float]]:
         if stem == "a" and value > 0.0:
             edges.append((index[0], index[1], float(value)))
     return edges
+
+
+def earlier_equilibria(result: Result, players: int | None = None) -> FloatArray:
+    """Equilibria of the first players, or of all, that costs changed on the way left behind, (K, D)."""
+    points = np.round(result.equilibria[:, :players], 12)
+    return np.unique(points[np.any(points != points[-1], axis=2)], axis=0)
 
 
 def _second_order(result: Result) -> list[int]:

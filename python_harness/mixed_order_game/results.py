@@ -105,7 +105,8 @@ class Result:
     @property
     def v(self) -> FloatArray:
         """Velocities, (T, N, D), 1/s; NaN for order 1, or everywhere if no player has order 2."""
-        if not indices_of(self.columns, "v") and indices_of(self.columns, "u"):
+        accelerated = indices_of(self.columns, "v") or indices_of(self.parameters, "v0")
+        if not accelerated and indices_of(self.columns, "u"):
             return np.full((len(self.time), self.players, self.dimension), np.nan)
         return self._signal("v")
 
@@ -151,13 +152,18 @@ class Result:
         return np.asarray(self._signal("x_star")[-1])
 
     @property
+    def equilibria(self) -> FloatArray:
+        """Nash equilibrium at each sample, (T, N, D), of the costs in force there."""
+        return self._signal("x_star")
+
+    @property
     def nash_error(self) -> FloatArray:
         """2-norm of x - x*, (T,), x* of the costs in force at each time."""
         return self["nash_error"]
 
     def largest_error(self, begin: float = -np.inf, end: float = np.inf) -> float:
         """Largest |x_il - x*_il| over players, coordinates and the samples in [begin, end], in s."""
-        return _largest(self.x - self._signal("x_star"), self.window(begin, end))
+        return _largest(self.x - self.equilibria, self.window(begin, end))
 
     def largest_velocity(self, begin: float = -np.inf, end: float = np.inf) -> float:
         """Largest |v_il| over second-order players and the samples in [begin, end]; 0 if all have order 1."""

@@ -1,12 +1,13 @@
 """Figures: the curves expected with the data expected, legends and labels, files of each kind."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from matplotlib.axes import Axes
 
-from mixed_order_game import PlotError, Result, plot
+from mixed_order_game import PlotError, Result, ResultError, plot
 
 T, N = 400, 5
 ORDER = (1, 1, 1, 2, 2)
@@ -89,6 +90,65 @@ def test_plane_draws_paths_graph_and_equilibrium() -> None:
     assert len([line for line in plot.plot_plane(result, edges=[]).lines if line.get_gid() == "edge"]) == 0
     with pytest.raises(PlotError, match="3 coordinates, not 2"):
         plot.plot_plane(make(dimension=3))
+
+
+def changed_costs() -> Result:
+    """The equilibrium of player 2 steps from -0.5 to 1 after sample 100, both coordinates."""
+    result = make()
+    for coordinate in (1, 2):
+        result.columns[f"x_star[2,{coordinate}]"][101:] = 1.0
+    return result
+
+
+def test_the_equilibrium_is_drawn_as_it_was_at_each_time() -> None:
+    axes = plot.plot_positions(changed_costs())
+    levels = [line for line in axes.lines if str(line.get_label()).startswith("_")]
+    assert sorted((line.get_ydata()[0], line.get_ydata()[-1]) for line in levels) == [
+        (-0.5, -0.5),
+        (-0.5, 1.0),
+    ]
+    moved = max(levels, key=lambda line: line.get_ydata()[-1])
+    assert moved.get_drawstyle() == "steps-pre"  # a change acts from its sample on, shown by the next one
+    assert list(moved.get_ydata()[100:102]) == [-0.5, 1.0]
+    plane = plot.plot_plane(changed_costs())
+    crosses = {str(line.get_color()): line.get_xydata() for line in plane.lines if line.get_marker() == "x"}
+    np.testing.assert_array_equal(crosses[plot.EARLIER], [[-0.5, -0.5]])
+    assert [1.0, 1.0] in crosses["black"].tolist()
+    assert "equilibrium before" in legend_texts(plane)
+    assert "equilibrium before" not in legend_texts(plot.plot_plane(make()))
+
+
+def test_errors_within_the_tolerance_are_shaded() -> None:
+    """The floor is |tolerance |x*| + absolute tolerance|, ten entries of 0.5e-8 + 1e-10."""
+    result = replace(make(), tolerance=1e-8)
+    floor = plot.integrator_floor(result)
+    assert floor == pytest.approx(np.sqrt(10.0) * 5.1e-9)
+    other = replace(result, parameters={"tolerance_relative": 1e-6, "tolerance_absolute": 1e-3})
+    assert plot.integrator_floor(other) == pytest.approx(np.sqrt(10.0) * (0.5e-6 + 1e-3))
+    axes = plot.plot_error({"above": replace(make(stop=1.0), tolerance=1e-8), "below": result})
+    assert legend_texts(axes) == ["above", "below", "integrator's tolerance"]
+    assert axes.get_ylim()[0] == pytest.approx(plot.BELOW_FLOOR * floor)
+    (shade,) = axes.patches
+    assert shade.get_extents().transformed(axes.transData.inverted()).y1 == pytest.approx(floor)
+    assert len(plot.plot_error(make()).patches) == 0  # of an unknown tolerance nothing is shaded
+
+
+def test_a_result_is_drawn_as_far_as_it_goes() -> None:
+    """What was not recorded has no figure, and is not said not to exist."""
+    whole = replace(make(), parameters={"v0[4,1]": 0.0, "k1": 1.0})
+    assert list(plot.result_figures(whole)) == ["positions", "velocities", "error", "plane"]
+    for left_out, kept in (
+        ("v", ["positions", "error", "plane"]),
+        ("x", ["velocities", "error"]),
+        ("nash_error", ["positions", "velocities", "plane"]),
+    ):
+        part = {name: each for name, each in whole.columns.items() if name.split("[")[0] != left_out}
+        assert list(plot.result_figures(replace(whole, columns=part))) == kept
+    bare = {name: each for name, each in whole.columns.items() if name.startswith(("u", "x_star"))}
+    with pytest.raises(ResultError, match="v was not recorded"):
+        plot.plot_velocities(replace(whole, columns=bare))
+    with pytest.raises(ResultError, match="nothing to draw"):
+        plot.result_figures(replace(whole, columns=bare))
 
 
 def test_inset_enlarges_a_short_transient_and_covers_no_settled_curve() -> None:

@@ -1,5 +1,6 @@
 """The report: one page that needs no network, looked at in a headless Chromium."""
 
+import base64
 import json
 import re
 import shutil
@@ -89,6 +90,36 @@ def test_figures_are_what_plotly_takes(evidence: Evidence) -> None:
     for figure in figures(evidence):
         drawn = Figure(data=figure.data, layout=figure.layout, frames=figure.frames)  # validates every name
         assert len(drawn.data) >= 2
+
+
+def values(packed: dict[str, str]) -> np.ndarray:
+    return np.frombuffer(base64.b64decode(packed["bdata"]), dtype="<f4")
+
+
+def test_curves_are_whole_and_the_tolerance_is_shaded(evidence: Evidence) -> None:
+    drawn = {figure.name: figure for figure in figures(evidence)}
+    for name, copies in (("error", 1), ("consensus", 5)):
+        curves = {trace["name"]: values(trace["y"]) for trace in drawn[name].data}
+        assert all(np.isfinite(curve).all() for curve in curves.values())
+        assert len(curves["neither perturbed nor robust"]) == len(curves["this run"])
+        floor = np.sqrt(copies * 10.0) * 1e-10 * (0.5 + 0.01)
+        assert curves["within the tolerance of integration"] == pytest.approx(floor)
+        assert "relative tolerance of 1e-10" in drawn[name].caption
+
+
+def test_the_equilibrium_is_drawn_as_it_was_at_each_time(fmu: Path) -> None:
+    changes = {0.5: {"cost_linear[1,1]": -6.0}}
+    result = run(fmu, stop_time=1.0, step=0.1, outputs=["x", "nash_error"], changes=changes)
+    drawn = {figure.name: figure for figure in figures(evidence_of_result(result))}
+    (level,) = (trace for trace in drawn["actions"].data if trace["name"] == "x*[1,1]")
+    assert level["line"]["shape"] == "vh"
+    assert values(level["x"]) == pytest.approx([0.0, 0.5, 0.6, 1.0])
+    np.testing.assert_allclose(values(level["y"]), result["x_star[1,1]"][[0, 5, 6, 10]], rtol=1e-6)
+    assert values(level["y"])[1] != values(level["y"])[2]
+    crosses = {
+        trace["name"]: values(trace["x"]) for trace in drawn["plane"].data if trace["mode"] == "markers"
+    }
+    assert crosses["equilibrium before"] == pytest.approx([-0.5])
 
 
 def test_unknown_term_is_what_drives_the_plant(fmu: Path) -> None:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from ..errors import ResultError
 from ..metrics import metrics
 from ..names import indices_of
-from ..plot import PALETTE, edges_of
+from ..plot import BELOW_FLOOR, PALETTE, SMALLEST_ERROR, earlier_equilibria, edges_of, integrator_floor
 from ..results import Result
 from .evidence import Evidence, energy_so_far, shared_signal, sphere_switches, weight_bound
 
@@ -45,9 +45,6 @@ SHORT_TRANSIENT = 0.4
 
 LATE = ("error", "consensus", "network")
 """Figures that begin with the whole run."""
-
-SMALLEST_ERROR = 1e-14
-"""Errors below are rounding and are not drawn."""
 
 
 @dataclass
@@ -110,16 +107,22 @@ def _choose_range(figure: Figure, result: Result) -> None:
 def _actions(evidence: Evidence) -> Figure:
     result = evidence.result
     data = _per_player(evidence, result.x, "x")
-    span = result.time[[0, -1]]
-    levels = [(i, k, result.x_star[i, k]) for i in range(_drawn(result)) for k in range(result.dimension)]
     palette = colours(result.players)
-    data += [
-        _line(span, np.array([level, level]), f"x*[{i + 1},{k + 1}]", palette[i], width=0.8, opacity=0.6)
-        | {"legendgroup": f"player {i + 1}", "showlegend": False, "hoverinfo": "skip"}
-        for i, k, level in levels
-    ]
-    caption = f"{_styles(result)}Thin lines: the Nash equilibrium x*.{_left_out(result)}"
+    for i in range(_drawn(result)):
+        for k in range(result.dimension):
+            time, level = _corners(result.time, result.equilibria[:, i, k])
+            line = _line(time, level, f"x*[{i + 1},{k + 1}]", palette[i], width=0.8, opacity=0.6)
+            line["line"]["shape"] = "vh"
+            data.append(line | {"legendgroup": f"player {i + 1}", "showlegend": False, "hoverinfo": "skip"})
+    caption = f"{_styles(result)}Thin lines: the Nash equilibrium x* of each time.{_left_out(result)}"
     return Figure("actions", "Actions", caption, data, _over_time("action x" + _unit(result, "x")))
+
+
+def _corners(time: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """The samples that a step line needs: the ends and those beside a change."""
+    changes = np.flatnonzero(np.diff(values)) + 1
+    kept = np.unique(np.concatenate([[0], changes - 1, changes, [len(time) - 1]]))
+    return time[kept], values[kept]
 
 
 def _velocities(evidence: Evidence) -> Figure | None:
@@ -155,6 +158,17 @@ def _plane(evidence: Evidence) -> Figure | None:
             "marker": {"symbol": "x", "size": 9, "color": "black"},
         }
     )
+    earlier = earlier_equilibria(result, N)[:, :PLANE]
+    if len(earlier):
+        data.append(
+            data[-1]
+            | {
+                "name": "equilibrium before",
+                "x": _packed(earlier[:, 0]),
+                "y": _packed(earlier[:, 1]),
+                "marker": {"symbol": "x", "size": 9, "color": "#aaaaaa"},
+            }
+        )
     first_moment = _moment(x[0], edges, palette, text=N <= MOST_LEGEND)
     moving = list(range(len(data), len(data) + len(first_moment)))
     data += first_moment
@@ -228,7 +242,8 @@ def _plane(evidence: Evidence) -> Figure | None:
     layout["yaxis"]["scaleanchor"] = "x"
     first = " of the first two coordinates" if result.dimension > PLANE else ""
     caption = (
-        f"Paths in the plane{first}. Grey: the communication graph; crosses: the equilibrium. "
+        f"Paths in the plane{first}. Grey lines: the communication graph at the start; crosses: the "
+        f"equilibrium{', grey ones before the costs changed' if len(earlier) else ''}. "
         f"Play moves the players, faster through slow parts.{_left_out(result)}"
     )
     return Figure("plane", "Paths in the plane", caption, data, layout, frames=frames)
@@ -268,25 +283,22 @@ def _error(evidence: Evidence) -> Figure:
     result, plain = evidence.result, evidence.plain
     data = [_positive(result.time, result.nash_error, "this run", PALETTE[0])]
     caption = "Distance to the equilibrium, 2-norm over all players and coordinates."
+    layout = _over_time("|x - x*|" + _unit(result, "x"))
+    layout["yaxis"] |= {"type": "log", "exponentformat": "power"}
     if plain is not None:
         data.append(_positive(plain.time, plain.nash_error, "neither perturbed nor robust", PALETTE[1]))
     if plain is not None and evidence.abscissa is not None and evidence.abscissa < 0.0:
         anchor = int(np.argmax(plain.nash_error < 1e-3 * plain.nash_error[0]))
         predicted = plain.nash_error[anchor] * np.exp(evidence.abscissa * (plain.time - plain.time[anchor]))
-        floor = plain.nash_error[anchor] * 1e-8
         rate = f"{-evidence.abscissa:.3g}"
-        data.append(
-            _positive(
-                plain.time, np.where(predicted > floor, predicted, 0.0), f"predicted rate {rate} 1/s", GREY
-            )
-        )
-        data[-1]["line"]["dash"] = "dash"
+        shown = predicted > integrator_floor(plain)
+        line = _line(plain.time[shown], predicted[shown], f"slowest rate {rate} 1/s", GREY, dash="dash")
+        data.append(line)
         caption += (
-            f" Dashed: exp(-{rate} t), the rate that the spectrum of the linear loop predicts for the run "
-            "that is neither perturbed nor robust."
+            f" Dashed: exp(-{rate} t), the slowest rate in the linear loop's spectrum, at which the run that "
+            "is neither perturbed nor robust falls in the end, unless it starts without that mode."
         )
-    layout = _over_time("|x - x*|" + _unit(result, "x"))
-    layout["yaxis"] |= {"type": "log", "exponentformat": "power"}
+    caption += _shade(evidence, "nash_error", 1, data, layout)
     return Figure("error", "Distance to the equilibrium", caption, data, layout)
 
 
@@ -329,6 +341,7 @@ def _consensus(evidence: Evidence) -> Figure:
     layout = _over_time("|y - 1 (x) xbar|")
     layout["yaxis"] |= {"type": "log", "exponentformat": "power"}
     caption = "2-norm of all estimates' distances to the signals that the players share."
+    caption += _shade(evidence, "consensus_error", result.players, data, layout)
     return Figure("consensus", "Disagreement of the estimates", caption, data, layout)
 
 
@@ -478,8 +491,30 @@ def _line(
 
 
 def _positive(time: FloatArray, values: FloatArray, name: str, colour: str) -> Trace:
-    """A line on a logarithmic axis."""
-    return _line(time, np.where(values > SMALLEST_ERROR, values, np.nan), name, colour)
+    """A line on a logarithmic axis, which has no 0."""
+    return _line(time, np.maximum(values, SMALLEST_ERROR), name, colour)
+
+
+def _shade(evidence: Evidence, signal: str, copies: int, data: list[Trace], layout: dict[str, Any]) -> str:
+    """Shade what lies within the integrator's tolerance, if a run goes there; returns the caption's part.
+
+    copies: how often the signal, a 2-norm, counts the actions. The axis ends a little below the tolerance.
+    """
+    runs = [run for run in (evidence.result, evidence.plain) if run is not None]
+    floors = [float(np.sqrt(copies)) * integrator_floor(run) for run in runs]
+    reached = [k for k, run in enumerate(runs) if run[signal].min() < floors[k]]
+    if not reached:
+        return ""
+    floor = floors[reached[-1]]
+    ends = evidence.result.time[[0, -1]]
+    data.insert(
+        0,
+        _line(ends, np.array([floor, floor]), "within the tolerance of integration", GREY, width=0.0)
+        | {"fill": "tozeroy", "fillcolor": "rgba(119,119,119,0.18)", "hoverinfo": "skip"},
+    )
+    largest = max(float(run[signal].max()) for run in runs)
+    layout["yaxis"]["range"] = [float(np.log10(BELOW_FLOOR * floor)), float(np.log10(2.0 * largest))]
+    return f" Shaded: within the integrator's relative tolerance of {runs[reached[-1]].tolerance:g}."
 
 
 def _chosen(trace: Trace, position: int) -> Trace:
