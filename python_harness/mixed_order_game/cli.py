@@ -212,7 +212,7 @@ def run(
         span = stop - start_time
         schedule = None if graph_schedule is None else read_graph_schedule(graph_schedule, model)
         if schedule is not None:
-            values = {**schedule.start_values(start_time), **values}
+            values = {**schedule.start_values(start_time), **model.expanded(values)}
         result = simulator.run(
             start_values=values,
             start_time=start_time,
@@ -269,8 +269,12 @@ def plot(
         ),
     ] = None,
     output: Annotated[Path, typer.Option("--output", "-o", help="Folder for the figures.")] = Path("figures"),
-    file_format: Annotated[FigureFormat, typer.Option("--format", help="File format.")] = FigureFormat.PDF,
-    width: Annotated[FigureWidth, typer.Option(help="Width in a two-column paper.")] = FigureWidth.COLUMN,
+    file_format: Annotated[
+        FigureFormat, typer.Option("--format", case_sensitive=False, help="File format.")
+    ] = FigureFormat.PDF,
+    width: Annotated[
+        FigureWidth, typer.Option(case_sensitive=False, help="Width in a two-column paper.")
+    ] = FigureWidth.COLUMN,
     force: ForceOption = False,
 ) -> None:
     """Draw the figures of a result, or of a game the paper's four, the error and the paths in the plane.
@@ -330,7 +334,9 @@ def demo(
         Path | None,
         typer.Option(help="The FMU or game to use; the paper's example when left out.", show_default=False),
     ] = None,
-    file_format: Annotated[FigureFormat, typer.Option("--format", help="File format.")] = FigureFormat.PNG,
+    file_format: Annotated[
+        FigureFormat, typer.Option("--format", case_sensitive=False, help="File format.")
+    ] = FigureFormat.PNG,
     force: ForceOption = False,
 ) -> None:
     """Simulate the paper's example, judge each claim, print the verdict and write results and figures.

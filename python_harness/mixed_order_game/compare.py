@@ -105,7 +105,6 @@ def compare(
     Raises VariableError for values that the FMU does not take; a run that it gives up becomes an entry with
     its words.
     """
-    shared = dict(start_values or {})
     wanted: dict[str, Mapping[str, Value]] = {AS_IT_IS: {}}
     for label, values in [*(variants or {}).items(), *(BASELINES.items() if baselines else ())]:
         if label in wanted:
@@ -116,7 +115,8 @@ def compare(
     runs: list[Compared] = []
     with Sampler(fmu) as sampler:
         model = sampler.model
-        starts = {label: {**shared, **values} for label, values in wanted.items()}
+        shared = model.expanded(start_values or {})
+        starts = {label: {**shared, **model.expanded(values)} for label, values in wanted.items()}
         changes = {label: changed_values(model, model.start_values(start)) for label, start in starts.items()}
         for label, start in starts.items():
             try:

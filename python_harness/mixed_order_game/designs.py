@@ -7,6 +7,7 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import NDArray
 
+from .arguments import value_of_text
 from .errors import MixedOrderGameError
 from .model import Value
 
@@ -119,8 +120,11 @@ def _range_parts(text: str) -> tuple[list[str], bool]:
 
 
 def _value(text: str) -> Value:
-    booleans = {"true": True, "false": False}
-    return booleans[text.strip().lower()] if text.strip().lower() in booleans else _number(text)
+    try:
+        value = value_of_text(text)
+    except ValueError as error:
+        raise DesignError(str(error)) from None
+    return value if isinstance(value, bool) else _number(text)
 
 
 def _number(text: str) -> float:

@@ -14,6 +14,8 @@ def reason(error: Exception) -> str:
         if isinstance(error, FileExistsError):  # of a folder to be made where a file stands
             return "not a directory"
         return error.strerror[0].lower() + error.strerror[1:]
+    if isinstance(error, KeyError):
+        return f"{error.args[0]} is missing"
     return str(error)
 
 

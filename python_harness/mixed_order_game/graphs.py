@@ -201,6 +201,7 @@ def graphs_of_text(
 
     Raises GraphError for a name or argument that makes no sense.
     """
+    text = text.strip().lower()
     if text[:1].isdigit():
         return [graph_of_text(text, players)]
     if text == "all":

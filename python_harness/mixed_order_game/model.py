@@ -10,7 +10,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import fmpy
 import numpy as np
@@ -22,6 +22,7 @@ from .reading import expect_file, read_text, text_of, toml_of
 
 MODEL_IDENTIFIER = "MixedOrderGame"
 Value = float | bool
+Entry = TypeVar("Entry")
 
 CAPABILITIES = (
     "canHandleVariableCommunicationStepSize",
@@ -145,6 +146,21 @@ class Model:
                 raise self._unknown(name, [*self._groups, *self.variables])
         return list(chosen.values())
 
+    def expanded(self, values: Mapping[str, Entry]) -> dict[str, Entry]:
+        """The values by single variables: a name without indices stands for all of its kind, as in select.
+
+        Raises VariableError for a name that does not exist and a variable that two names set.
+        """
+        expanded: dict[str, Entry] = {}
+        set_by: dict[str, str] = {}
+        for name, value in values.items():
+            for variable in self.select([name]):
+                single = variable.name
+                if single in set_by:
+                    raise VariableError(f"{single} is set by both {set_by[single]} and {name}")
+                set_by[single], expanded[single] = name, value
+        return expanded
+
     def _rates(self, name: str) -> list[str]:
         """Names of all time derivatives of one kind, der(x[1,1]), ... for der(x); none for another name."""
         if not (name.startswith("der(") and name.endswith(")")):
@@ -155,7 +171,7 @@ class Model:
 
     @staticmethod
     def _unknown(name: str, known: Iterable[str]) -> VariableError:
-        near = difflib.get_close_matches(name, known, n=3, cutoff=0.5)
+        near = difflib.get_close_matches(name, dict.fromkeys(known), n=3, cutoff=0.5)
         hint = f"; did you mean {' or '.join(near)}?" if near else ""
         return VariableError(f"there is no variable {name}{hint}")
 
@@ -187,6 +203,7 @@ class Model:
     def start_values(self, changes: Mapping[str, Value] | None = None) -> dict[str, Value]:
         """Every parameter and input with its start value, changes in place of the model's own.
 
+        In changes a name without indices stands for all of its kind.
         Raises VariableError for a change that the FMU would not take.
         """
         values = {
@@ -194,7 +211,7 @@ class Model:
             for name, variable in self.variables.items()
             if variable.causality in ("parameter", "input") and variable.start is not None
         }
-        for name, value in (changes or {}).items():
+        for name, value in self.expanded(changes or {}).items():
             values[name] = check_value(self.variable(name), value)
         return values
 

@@ -103,9 +103,10 @@ def _dynamics(players: Sequence[Mapping[str, Any]], kind: str, dimension: int) -
 
 
 def _estimates(players: Sequence[Mapping[str, Any]], dimension: int) -> FloatArray:
-    """y0 (N, N, D) of the game file; 0 where absent."""
+    """y0 (N, N, D) of the game file; one number stands for all of a player, 0 for none."""
     estimates = np.zeros((len(players), len(players), dimension))
     for i, player in enumerate(players):
-        for j, entries in enumerate(player.get("y0", [])):
-            estimates[i, j] = entries
+        y0 = player.get("y0", 0.0)
+        for j in range(len(players)):
+            estimates[i, j] = y0[j] if isinstance(y0, list) else y0
     return estimates

@@ -21,8 +21,10 @@ from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import FMU2Slave, defaultCallbacks, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE, fmi2Discard
 from numpy.typing import ArrayLike, NDArray
 
+from .arguments import number_argument
 from .errors import SimulationError
 from .model import Model, Value, Variable, check_value, read_model
+from .names import split_names
 from .results import Result
 from .schedule import Disturbance
 from .temporary import explained, new_folder
@@ -164,7 +166,8 @@ class Simulator:
     ) -> Result:
         """Run from start_time to stop_time, in s, and sample every step, both ends included.
 
-        start_values: parameters and inputs to set first, others keep the FMU's start values.
+        start_values: parameters and inputs to set first, others keep the FMU's start values; a stands for
+            every a[i,j], here, in changes and in outputs.
         step: communication step in s; the last one is shorter if the horizon is not a multiple of it.
         tolerance: relative tolerance of the integrator.
         outputs: names to record; x stands for every x[i,l], der(x) for every der(x[i,l]). Default: all
@@ -184,19 +187,29 @@ class Simulator:
         """
         if self._slave is None:
             raise SimulationError("the simulator is closed")
+        start_time, stop_time, step, tolerance = (
+            number_argument(value, name, SimulationError)
+            for name, value in (
+                ("start_time", start_time),
+                ("stop_time", stop_time),
+                ("step", step),
+                ("tolerance", tolerance),
+            )
+        )
         time = _samples(start_time, stop_time, step)
         if not (np.isfinite(tolerance) and 0.0 < tolerance < 1.0):
             raise SimulationError(f"tolerance = {tolerance:g} is not between 0 and 1")
-        parameters = self.model.start_values(start_values)
+        start = self.model.expanded(start_values or {})
+        parameters = self.model.start_values(start)
         schedule = _schedule(self.model, changes or {}, time)
         disturbance = _disturbance(self.model, inputs, time)
         if inputs is not None:
-            _check_set_once(self.model, [start_values or {}, *schedule.values()])
+            _check_set_once(self.model, [start, *schedule.values()])
         recorder = _Recorder(self._slave, self._recorded(outputs), len(time))
         points = np.union1d(time, [*schedule, *disturbance.times]).tolist()
 
         try:
-            self._initialize({name: parameters[name] for name in start_values or {}}, time, tolerance)
+            self._initialize({name: parameters[name] for name in start}, time, tolerance)
             disturbance.set(self._slave, points[0])
             self._slave.exitInitializationMode()
             recorder.read(0)
@@ -250,6 +263,8 @@ class Simulator:
                 getattr(self._slave, setter)(references, list(chosen.values()))
 
     def _recorded(self, outputs: Sequence[str] | None) -> list[Variable]:
+        if isinstance(outputs, str):  # as the command takes them
+            outputs = split_names(outputs)
         if outputs is not None:
             return self.model.select([*outputs, "x_star"])
         left_out = {variable.name for stem in LEFT_OUT for variable in self.model.indexed(stem).values()}
@@ -418,13 +433,14 @@ def _schedule(model: Model, changes: Changes, samples: NDArray[np.float64]) -> d
     """The changes by time, their values checked; a time that is nearly a sample's becomes that sample's."""
     schedule: dict[float, dict[str, Value]] = {}
     start, stop = float(samples[0]), float(samples[-1])
-    when = np.array(sorted(changes), dtype=np.float64)
+    times = {number_argument(when, "the time of a change", SimulationError): when for when in changes}
+    when = np.array(sorted(times), dtype=np.float64)
     for time, point in zip(when.tolist(), _on_samples(when, samples).tolist(), strict=True):
         if not start <= point < stop:
             raise SimulationError(f"the change at {time:g} s is outside [{start:g}, {stop:g}) s")
         values = {
             name: check_value(model.variable(name), value, during_run=True)
-            for name, value in changes[time].items()
+            for name, value in model.expanded(changes[times[time]]).items()
         }
         schedule.setdefault(point, {}).update(values)
     return schedule

@@ -15,6 +15,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from .arguments import number_argument
 from .designs import Range
 from .errors import MixedOrderGameError, SimulationError
 from .graphs import CommunicationGraph, graph_of
@@ -213,6 +214,9 @@ def tune(
     Raises TuneError for a wish without sense, VariableError for gains and values that the FMU does not take,
     GraphError for graphs that it does not take.
     """
+    settling_time = number_argument(settling_time, "settling_time", TuneError)
+    if stop_time is not None:
+        stop_time = number_argument(stop_time, "stop_time", TuneError)
     if not (np.isfinite(settling_time) and settling_time > 0.0):
         raise TuneError(f"the settling time {settling_time:g} s is not positive")
     if largest_error is not None and not (np.isfinite(largest_error) and largest_error > 0.0):
@@ -266,6 +270,7 @@ class _Search:
         self, graphs: Sequence[CommunicationGraph] | None, ranges: Mapping[str, Range], band: float | None
     ) -> None:
         model = self.sampler.model
+        self.fixed = model.expanded(self.fixed)
         if not self.names or len(set(self.names)) != len(self.names):
             raise TuneError("name every gain to tune once")
         unknown = [name for name in (*self.names, *ranges) if name not in DEFAULT_RANGES]

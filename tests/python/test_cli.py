@@ -95,6 +95,23 @@ def test_errors_of_run(arguments: list[str], told: str, fmu: Path) -> None:
     assert told in sentence(mog("run", fmu, *arguments))
 
 
+def test_kinds_and_words_in_settings(fmu: Path, tmp_path: Path) -> None:
+    """A name without indices stands for all of its kind, a switch takes words, as in sweeps."""
+    output = tmp_path / "run.parquet"
+    options = ["--set", "a=0.5", "--set", "Perturbed=no".lower(), "--set", "robust=OFF", "--stop-time", 0.1]
+    assert mog("run", fmu, *options, "--output", output).exit_code == 0
+    parameters = load(output).parameters
+    assert {value for name, value in parameters.items() if name.startswith("a[")} == {0.5}
+    assert (parameters["perturbed"], parameters["robust"]) == (False, False)
+    told = sentence(mog("run", fmu, "--set", "a=1", "--set", "a[1,2]=2"))
+    assert told == "mog: a[1,2] is set by both a and a[1,2]\n"
+    assert "k5; did you mean k4 or k3 or k2?" in sentence(mog("run", fmu, "--set", "k5=1"))
+    compared = mog("compare", fmu, "--set", "x0=1", "--variant", "still: perturbed=no, a=2", "--json",
+                   "--no-baselines", "--stop-time", 0.1)  # fmt: skip
+    changed = json.loads(compared.stdout)["still"]["changed"]
+    assert (changed["perturbed"], changed["a[1,3]"], changed["x0[5,2]"]) == (False, 2.0, 1.0)
+
+
 @pytest.mark.parametrize("command", ["info", "run", "validate", "plot"])
 def test_files_that_are_no_games(command: str, tmp_path: Path) -> None:
     (tmp_path / "text.fmu").write_text("text")

@@ -6,7 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mixed_order_game import ModelError, VariableError, read_model
+from mixed_order_game import ModelError, VariableError, build_fmu, default_game, read_model
+from mixed_order_game.analysis.game import read_game
+from mixed_order_game.authoring import check_game
 from mixed_order_game.model import check_value, provenance
 from tests.conftest import FmuOf
 
@@ -45,6 +47,40 @@ def test_select_expands_and_keeps_one_of_each(fmu: Path) -> None:
     names = [variable.name for variable in model.select(["x", "x[1,2]", "nash_error"])]
     assert len(names) == 11
     assert names[-1] == "nash_error"
+
+
+def test_names_without_indices_set_all_of_their_kind(fmu: Path) -> None:
+    model = read_model(fmu)
+    values = model.start_values({"x0": 2, "k1": 3.0, "d_ext[1,2]": 1.0})
+    assert {value for name, value in values.items() if name.startswith("x0[")} == {2.0}
+    assert (values["k1"], values["d_ext[1,2]"], values["d_ext[1,1]"]) == (3.0, 1.0, 0.0)
+    with pytest.raises(VariableError, match=r"a\[1,2\] is set by both a\[1,2\] and a$"):
+        model.start_values({"a[1,2]": 1.0, "a": 0.0})
+    with pytest.raises(VariableError, match=r"x\[1,1\] cannot be set: it is a continuous output"):
+        model.start_values({"x": 0.0})
+    with pytest.raises(VariableError, match="there is no variable x1; did you mean x"):
+        model.start_values({"x1": 0.0})
+
+
+@pytest.mark.parametrize("text", ["k5", "nash", "W_norm", "x_stra", "dynamics_gian"])
+def test_no_name_is_proposed_twice(text: str, fmu: Path) -> None:
+    for look_up in (read_model(fmu).variable, lambda name: read_model(fmu).select([name])):
+        with pytest.raises(VariableError) as told:
+            look_up(text)  # type: ignore[operator]
+        proposed = str(told.value).partition("did you mean ")[2].rstrip("?").split(" or ")
+        assert len(proposed) == len(set(proposed))
+
+
+@pytest.mark.parametrize("expose", ["all", "outputs"])
+def test_one_number_stands_for_all_estimates_of_a_player(expose: str, tmp_path: Path) -> None:
+    text = default_game().read_text(encoding="utf-8").replace("order = 1\n", "order = 1\ny0 = 1.5\n", 1)
+    game = tmp_path / "game.toml"
+    game.write_text(text.replace('expose = "all"', f'expose = "{expose}"'), encoding="utf-8")
+    assert check_game(game) == ()
+    expected = np.zeros((5, 5, 2))
+    expected[0] = 1.5
+    for source in (game, build_fmu(game, tmp_path / "game.fmu")):
+        np.testing.assert_array_equal(read_game(source).parameters.y0, expected)
 
 
 @pytest.mark.parametrize(

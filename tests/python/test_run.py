@@ -18,6 +18,8 @@ from mixed_order_game.build import shipped_game
 from mixed_order_game.names import parse_name
 from tests.conftest import FmuOf
 
+OUTPUTS = ("x", "x_star", "nash_error")
+
 
 @pytest.fixture(scope="module")
 def simulator(fmu: Path) -> Simulator:
@@ -143,6 +145,21 @@ def test_changes_on_the_way(simulator: Simulator) -> None:
     assert np.abs(changed.x[4:] - base.x[4:]).max() > 1e-6
 
 
+def test_names_without_indices_and_texts_as_on_the_command(simulator: Simulator) -> None:
+    singly = {f"a[{i},{j}]": 2.0 for i in range(1, 6) for j in range(i + 1, 6)}
+    times = {"stop_time": np.float64(0.4), "step": np.array(0.1)}
+    changed = simulator.run(start_values=singly, changes={0.2: singly | {"k1": 5.0}}, **times)  # type: ignore[arg-type]
+    by_kind = simulator.run(
+        start_values={"a": 2.0},
+        changes={0.2: {"a": 2.0, "k1": 5.0}},
+        outputs="x, nash_error",
+        **times,  # type: ignore[arg-type]
+    )
+    np.testing.assert_array_equal(by_kind.x, changed.x)
+    assert by_kind.parameters == changed.parameters
+    assert set(by_kind.columns) == {name for name in changed.columns if name.split("[")[0] in OUTPUTS}
+
+
 def test_costs_changed_on_the_way_move_the_equilibrium(simulator: Simulator) -> None:
     values = {"robust": False, "perturbed": False}
     changes = {5.0: {f"cost_linear[{i},1]": 0.0 for i in range(1, 6)}}
@@ -170,6 +187,11 @@ def test_interrupted_run_leaves_the_simulator_usable(simulator: Simulator) -> No
 @pytest.mark.parametrize(
     ("options", "told"),
     [
+        ({"stop_time": "5"}, "stop_time is '5', expected a number"),
+        ({"start_time": None}, "start_time is None, expected a number"),
+        ({"step": [0.1]}, "step is [0.1], expected a number"),
+        ({"tolerance": True}, "tolerance is True, expected a number"),
+        ({"changes": {"1": {"k1": 1.0}}}, "the time of a change is '1', expected a number"),
         ({"stop_time": 0.0}, "stop_time = 0 s is not after start_time = 0 s"),
         ({"stop_time": float("nan")}, "stop_time = nan"),
         ({"step": 0.0}, "step = 0 s is not positive"),

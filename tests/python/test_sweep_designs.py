@@ -17,7 +17,7 @@ from mixed_order_game.designs import (
 
 def test_grids() -> None:
     assert grid_of_text("1,2.5,7") == (1.0, 2.5, 7.0)
-    assert grid_of_text("true,false") == (True, False)
+    assert grid_of_text("true,false") == grid_of_text("Yes, no") == grid_of_text("on,OFF") == (True, False)
     assert grid_of_text("5:20:4") == (5.0, 10.0, 15.0, 20.0)
     assert grid_of_text("1:1000:4:log") == pytest.approx((1.0, 10.0, 100.0, 1000.0))
     assert grid_of_text("-1:1:3") == (-1.0, 0.0, 1.0)
@@ -54,7 +54,7 @@ def test_initial_states() -> None:
 @pytest.mark.parametrize(
     ("make", "told"),
     [
-        (lambda: grid_of_text("1,x"), "'x' is not a number"),
+        (lambda: grid_of_text("1,x"), "a number, true or false (yes, no, on, off) expected, not 'x'"),
         (lambda: grid_of_text("1,1"), "twice"),
         (lambda: grid_of_text("1:2"), "not a grid"),
         (lambda: grid_of_text("1:2:1"), "2 to 1000000 values, not 1"),

@@ -5,6 +5,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
+from ..arguments import number_argument
 from ..build import build_fmu, cached_fmu, source_of
 from ..errors import BuildError, GameError
 from ..model import Value
@@ -34,6 +35,7 @@ def analyse(
     Raises GameError, ModelError, BuildError, VariableError or SimulationError as reading, building and
     running do; GameError if the game has no unique Nash equilibrium or radius is not positive.
     """
+    radius = number_argument(radius, "radius", GameError)
     if not (math.isfinite(radius) and radius > 0.0):
         raise GameError(f"radius = {radius:g} is not positive")
     source = source_of(game)

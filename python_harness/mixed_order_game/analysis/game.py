@@ -158,8 +158,10 @@ def _game_from_tables(tables: Table, path: Path) -> AnalysedGame:
         for key, array in dynamics.items():
             for j, value in player.get("dynamics", {}).get(key, []):
                 array[i, _player(j, N)] = _coordinates(value, D)
-        if "y0" in player:
-            y0[i] = [_coordinates(row, D) for row in player["y0"]]
+        rows_of_y0 = player.get("y0", 0.0)
+        if not isinstance(rows_of_y0, list):
+            rows_of_y0 = [rows_of_y0] * N
+        y0[i] = [_coordinates(row, D) for row in rows_of_y0]
     adjacency = np.zeros((N, N))
     for i, j, *weight in tables["graph"]["edges"]:
         a, b = _player(i, N), _player(j, N)

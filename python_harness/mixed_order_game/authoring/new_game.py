@@ -70,9 +70,10 @@ def new_game(recipe: Recipe) -> str:
 
 def _orders(recipe: Recipe) -> list[int]:
     N = recipe.players
-    if recipe.orders in ("first", "second"):
-        return [1 if recipe.orders == "first" else 2] * N
-    if recipe.orders == "mixed":
+    word = recipe.orders.strip().lower()
+    if word in ("first", "second"):
+        return [1 if word == "first" else 2] * N
+    if word == "mixed":
         half = [1] * ((N + 1) // 2) + [2] * (N // 2)
         return [int(order) for order in np.random.default_rng([recipe.seed, 1]).permutation(half)]
     try:

@@ -7,6 +7,7 @@ from typing import TypeVar
 
 import typer
 
+from ..arguments import value_of_text
 from ..designs import DesignError, Range, range_of_text
 from ..graphs import CommunicationGraph, GraphError, graph_of_model, graphs_of_text
 from ..model import Model, Value
@@ -20,7 +21,7 @@ LINE_EVERY = 10.0
 
 def settings_of(texts: Iterable[str], hint: str = "--set") -> dict[str, Value]:
     """NAME=VALUE, each name once."""
-    return pairs_of(texts, _value, hint)
+    return pairs_of(texts, value_of_text, hint)
 
 
 def pairs_of(texts: Iterable[str], parse: Callable[[str], Parsed], hint: str) -> dict[str, Parsed]:
@@ -62,16 +63,6 @@ def graphs_option(texts: Sequence[str], model: Model, seed: int) -> tuple[Commun
 def names_option(texts: Iterable[str]) -> list[str]:
     """Comma-separated names of all texts."""
     return [name for text in texts for name in split_names(text)]
-
-
-def _value(text: str) -> Value:
-    booleans = {"true": True, "false": False}
-    if text.lower() in booleans:
-        return booleans[text.lower()]
-    try:
-        return float(text)
-    except ValueError:
-        raise ValueError(f"a number, true or false expected, not {text!r}") from None
 
 
 @contextmanager

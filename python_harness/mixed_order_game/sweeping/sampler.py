@@ -12,6 +12,7 @@ from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import fmi2True
 from numpy.typing import NDArray
 
+from ..arguments import number_argument
 from ..errors import SimulationError
 from ..metrics import Metrics, changed_values, sample_times, sampled_metrics
 from ..model import Value, check_value
@@ -35,11 +36,14 @@ class Settings:
 
     def __post_init__(self) -> None:
         for name in ("stop_time", "step", "tolerance"):
-            value = getattr(self, name)
+            value = number_argument(getattr(self, name), name, SimulationError)
             if not (np.isfinite(value) and value > 0.0):
                 raise SimulationError(f"{name} = {value:g} is not positive")
         if self.step > self.stop_time:
             raise SimulationError(f"step = {self.step:g} s is longer than the run, {self.stop_time:g} s")
+        for name in ("settle_time", "band"):
+            if getattr(self, name) is not None:
+                number_argument(getattr(self, name), name, SimulationError)
         if self.settle_time is not None and not 0.0 <= self.settle_time <= self.stop_time:
             raise SimulationError(f"settle_time = {self.settle_time:g} s is outside the run")
         if self.band is not None and not (np.isfinite(self.band) and self.band > 0.0):
@@ -111,7 +115,10 @@ class Sampler(Simulator):
         """Rows of x and u (T, 2 N D), x* (N, D), and the sphere events of the run."""
         if self._slave is None:
             raise SimulationError("the simulator is closed")
-        checked = {name: check_value(self.model.variable(name), value) for name, value in values.items()}
+        checked = {
+            name: check_value(self.model.variable(name), value)
+            for name, value in self.model.expanded(values).items()
+        }
         try:
             self._initialize(checked, time, tolerance)
             self._slave.exitInitializationMode()

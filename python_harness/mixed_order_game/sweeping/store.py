@@ -16,7 +16,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from ..errors import MixedOrderGameError, ResultError
+from ..errors import MixedOrderGameError, ResultError, reason
 from ..metrics import METRIC_UNITS
 from ..writing import is_partial, write_whole
 from .definition import Sweep
@@ -63,7 +63,7 @@ class Store:
         try:
             held = json.loads(definition.read_text(encoding="utf-8"))["fingerprint"]
         except (OSError, ValueError, KeyError, TypeError) as error:
-            raise SweepError(f"{definition} is not the definition of a sweep: {error}") from error
+            raise SweepError(f"{definition} is not the definition of a sweep: {reason(error)}") from error
         if held != self._sweep.fingerprint:
             raise SweepError(
                 f"{self.folder} holds another sweep (other values, FMU or package): "
@@ -112,7 +112,7 @@ def locked(folder: Path) -> Iterator[None]:
     except Timeout:
         raise SweepError(f"another sweep is at work in {folder}") from None
     except OSError as error:
-        raise ResultError(f"cannot write into {folder}: {error}") from error
+        raise ResultError(f"cannot write into {folder}: {reason(error)}") from error
     try:
         yield
     finally:
@@ -148,7 +148,7 @@ def read_definition(folder: Path) -> dict[str, Any]:
     try:
         data: dict[str, Any] = json.loads((folder / DEFINITION).read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
-        raise SweepError(f"{folder} holds no sweep: {error}") from error
+        raise SweepError(f"{folder} holds no sweep: {reason(error)}") from error
     return data
 
 
@@ -165,4 +165,4 @@ def _read(path: Path, columns: list[str] | None = None) -> pa.Table:
     try:
         return pq.read_table(path, columns=columns)
     except (OSError, pa.ArrowException) as error:
-        raise SweepError(f"{path} cannot be read: {error}") from error
+        raise SweepError(f"{path} cannot be read: {reason(error)}") from error
