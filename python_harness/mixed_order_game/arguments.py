@@ -4,6 +4,7 @@ from numbers import Real
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .errors import MixedOrderGameError
 
@@ -19,6 +20,14 @@ def value_of_text(text: str) -> float | bool:
         return float(word)
     except ValueError:
         raise ValueError(f"a number, true or false (yes, no, on, off) expected, not {text!r}") from None
+
+
+def array_argument(value: object, name: str, error: type[MixedOrderGameError]) -> NDArray[np.float64]:
+    """The value as an array. Raises the error, with the argument's name, for what is no array of numbers."""
+    try:
+        return np.asarray(value, dtype=np.float64)
+    except (TypeError, ValueError):  # also of rows that differ in length
+        raise error(f"{name} is not an array of numbers") from None
 
 
 def number_argument(value: object, name: str, error: type[MixedOrderGameError]) -> float:

@@ -196,14 +196,14 @@ def run(
 
     mog run --graph-schedule switching.toml --disturbance gust.csv
     """
-    from .names import split_names
     from .run import Simulator
     from .schedule import read_disturbance, read_graph_schedule
-    from .sweeping.options import settings_of
+    from .sweeping.options import names_option, settings_of
     from .tables import print_result
     from .writing import RESULT
 
     values = settings_of(settings or [])
+    names = names_option(variables, "--variables") if variables else None
     if output is not None:
         output_option(output, RESULT, inputs=[game, graph_schedule, disturbance], force=force)
     with Simulator(game) as simulator, _progress() as show:
@@ -219,7 +219,7 @@ def run(
             stop_time=stop,
             step=model.step if step is None else step,
             tolerance=model.tolerance if tolerance is None else tolerance,
-            outputs=None if not variables else [name for text in variables for name in split_names(text)],
+            outputs=names,
             changes=None if schedule is None else schedule.changes(stop, start_time),
             inputs=None
             if disturbance is None

@@ -78,6 +78,10 @@ class Result:
         try:
             return self.columns[name]
         except KeyError:
+            found = indices_of(self.columns, name)
+            if found:
+                first = next(iter(found.values()))
+                raise ResultError(f"{name} has indices: name one variable, such as {first}") from None
             raise ResultError(f"{name} was not recorded: name it in the outputs of the run") from None
 
     @property

@@ -21,7 +21,7 @@ from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import FMU2Slave, defaultCallbacks, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE, fmi2Discard
 from numpy.typing import ArrayLike, NDArray
 
-from .arguments import number_argument
+from .arguments import array_argument, number_argument
 from .errors import SimulationError
 from .model import Model, Value, Variable, check_value, read_model
 from .names import split_names
@@ -348,7 +348,7 @@ class _Function(_Inputs):
         self._function = function
 
     def set(self, slave: Any, time: float) -> None:
-        value = np.asarray(self._function(time), dtype=np.float64)
+        value = array_argument(self._function(time), f"inputs({time:g})", SimulationError)
         if value.shape != self._shape:
             raise SimulationError(f"inputs({time:g}) has the shape {value.shape}, not {self._shape}")
         _check_finite(value, f"inputs({time:g})")
@@ -392,7 +392,7 @@ def _disturbance(model: Model, inputs: Inputs | None, samples: NDArray[np.float6
         return _rows_of(model, inputs, samples)
     if callable(inputs):
         return _Function(model, inputs)
-    array = np.asarray(inputs, dtype=np.float64)
+    array = array_argument(inputs, "inputs", SimulationError)
     if array.shape not in (shape, (len(samples), *shape)):
         raise SimulationError(f"inputs has the shape {array.shape}, not {shape} or {(len(samples), *shape)}")
     _check_finite(array, "inputs")

@@ -11,6 +11,7 @@ import secrets
 import stat
 import zipfile
 from collections.abc import Callable, Iterable
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Any
@@ -110,7 +111,8 @@ def write_whole(path: Path, write: Callable[[IO[bytes]], object]) -> None:
         raise ResultError(f"cannot write {path}: {reason(error)}") from error
     finally:
         if partial is not None:
-            partial.unlink(missing_ok=True)
+            with suppress(OSError):  # it is gone, or never was where nothing can be written
+                partial.unlink()
 
 
 def is_partial(path: Path) -> bool:

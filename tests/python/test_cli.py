@@ -58,6 +58,7 @@ def test_installed_command(fmu: Path) -> None:
         ["nonsense"],
         ["run", "--nonsense"],
         ["run", "--set", "k1"],
+        ["run", "--variables", ","],
         ["run", "--set", "=1"],
         ["run", "--set", "k1=ten"],
         ["run", "--set", "k1=1", "--set", "k1=2"],

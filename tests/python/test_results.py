@@ -138,6 +138,8 @@ def test_repr_is_short() -> None:
 
 
 def test_missing_signals_are_named() -> None:
+    with pytest.raises(ResultError, match=r"^x has indices: name one variable, such as x\[1,1\]$"):
+        _ = make()["x"]
     with pytest.raises(ResultError, match="phi was not recorded"):
         _ = make().phi
     with pytest.raises(ResultError, match=r"x\[9,9\] was not recorded"):

@@ -1,5 +1,6 @@
 """The rule for files that are written: whole, never over an input, over nothing of another kind unasked."""
 
+import errno
 import os
 import stat
 from collections.abc import Iterator
@@ -112,6 +113,16 @@ def test_symbolic_links_stay(tmp_path: Path) -> None:
     circle.symlink_to(circle)
     with pytest.raises(ResultError, match="cannot write"):
         save(circle)
+
+
+def test_a_folder_that_lets_nothing_be_removed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*_: object, **__: object) -> None:
+        raise PermissionError(errno.EACCES, "Permission denied")
+
+    for name in ("open", "unlink"):
+        monkeypatch.setattr(Path, name, refuse)
+    with pytest.raises(ResultError, match=r"cannot write .*run\.csv: permission denied"):
+        save(tmp_path / "run.csv")
 
 
 def test_places_that_take_no_file(tmp_path: Path) -> None:

@@ -60,9 +60,15 @@ def graphs_option(texts: Sequence[str], model: Model, seed: int) -> tuple[Commun
     return tuple(graphs)
 
 
-def names_option(texts: Iterable[str]) -> list[str]:
-    """Comma-separated names of all texts."""
-    return [name for text in texts for name in split_names(text)]
+def names_option(texts: Iterable[str], hint: str) -> list[str]:
+    """Comma-separated names of all texts. Raises typer.BadParameter for a text that holds none."""
+    names: list[str] = []
+    for text in texts:
+        found = split_names(text)
+        if not found:
+            raise typer.BadParameter(f"names separated by commas expected, not {text!r}", param_hint=hint)
+        names += found
+    return names
 
 
 @contextmanager
