@@ -165,9 +165,9 @@ TEST(NashEquilibrium, OfALongChainNeedsLittleStack) {
   constexpr std::size_t stack = 64 * 1024;
 #endif
   QuadraticCost cost(players, 1);
-  std::fill(cost.quadratic.begin(), cost.quadratic.end(), 1.0);
-  for (int i = 0; i + 1 < players; ++i) cost.coupling[at(i * players + i + 1)] = 1e-3;
-  cost.linear.back() = -1.0;
+  cost.coefficients[QuadraticCost::quadratic].assign(players, 1.0);
+  for (int i = 0; i + 1 < players; ++i) cost.coefficients[QuadraticCost::coupling][at(i * players + i + 1)] = 1e-3;
+  cost.coefficients[QuadraticCost::linear].back() = -1.0;
   cost.refresh();
   struct Task {
     const QuadraticCost& cost;
