@@ -1,6 +1,7 @@
 """The command mog: parses options and prints; everything else is done by the library.
 
-Exit codes: 0 fine; 1 a check failed, or an error told in one sentence on stderr; 2 wrong usage.
+Exit codes: 0 fine; 1 a check failed, or an error told in one sentence on stderr; 2 wrong usage;
+130 after Ctrl-C.
 """
 
 import codecs
@@ -22,6 +23,7 @@ from .authoring.command import register as register_authoring
 from .build import SOURCE_OR_RESULT, fmu_of, game_file
 from .compare_command import register as register_compare
 from .errors import MixedOrderGameError, reason
+from .interrupts import INTERRUPTED, end_as_exceptions
 from .reporting.command import register as register_report
 from .shared_options import ForceOption, ToleranceOption, output_option
 from .sweep_command import register as register_sweep
@@ -33,12 +35,15 @@ if TYPE_CHECKING:
 
 
 class ErrorsAsSentences(typer.core.TyperGroup):
-    """Prints the package's own exceptions as one sentence on stderr and exits with 1."""
+    """Prints the package's own exceptions as one sentence on stderr and exits with 1; Ctrl-C gives 130."""
 
     def invoke(self, ctx: Any) -> Any:
         """Run a command."""
         try:
             return super().invoke(ctx)
+        except KeyboardInterrupt:
+            typer.echo("mog: interrupted", err=True)
+            raise typer.Exit(INTERRUPTED) from None
         except MixedOrderGameError as error:
             typer.echo(f"mog: {error}", err=True)
             raise typer.Exit(1) from error
@@ -363,6 +368,7 @@ register_tune(app)
 
 def main() -> None:
     """Entry point of the command, on any console."""
+    end_as_exceptions()
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):  # characters that it lacks are shown as \\uXXXX, not fatal
             utf8 = codecs.lookup(stream.encoding).name == "utf-8"

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from .errors import MixedOrderGameError, ResultError, SimulationError
+from .interrupts import noted_signals
 from .metrics import METRIC_UNITS, Metrics, changed_values, metrics
 from .model import Value
 from .results import Result, load
@@ -113,12 +114,13 @@ def compare(
     chosen = settings or Settings()
     band = chosen.band
     runs: list[Compared] = []
-    with Sampler(fmu) as sampler:
+    with noted_signals() as take_signals, Sampler(fmu) as sampler:
         model = sampler.model
         shared = model.expanded(start_values or {})
         starts = {label: {**shared, **model.expanded(values)} for label, values in wanted.items()}
         changes = {label: changed_values(model, model.start_values(start)) for label, start in starts.items()}
         for label, start in starts.items():
+            take_signals()
             try:
                 result = sampler.record(start, chosen)
             except SimulationError as error:

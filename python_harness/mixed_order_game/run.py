@@ -23,6 +23,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from .arguments import array_argument, number_argument
 from .errors import SimulationError
+from .interrupts import noted_signals
 from .model import Model, Value, Variable, check_value, read_model
 from .names import split_names
 from .results import Result
@@ -102,10 +103,21 @@ class Simulator:
         self._messages: list[tuple[int, str]] = []
         self._turn = Turn()
         self._process = os.getpid()
+        self._folder: Path | None = None
         self._slave: Any = None
-        self._folder = new_folder(SimulationError)
         try:
-            fmpy.extract(str(self.model.path), unzipdir=self._folder)
+            with noted_signals():
+                self._folder = new_folder(SimulationError)
+                self._load(self._folder)
+        except BaseException:  # of a signal, too
+            self.close()
+            raise
+        self._used = False
+
+    def _load(self, folder: Path) -> None:
+        """Unpack, load the library and make an instance, which needs the files no longer."""
+        try:
+            fmpy.extract(str(self.model.path), unzipdir=folder)
             self._callbacks = fmi2CallbackFunctions()
             self._callbacks.logger = fmi2CallbackLoggerTYPE(self._log)
             self._callbacks.allocateMemory = defaultCallbacks.allocateMemory
@@ -114,16 +126,16 @@ class Simulator:
                 slave = FMU2Slave(
                     guid=self.model.guid,
                     modelIdentifier="MixedOrderGame",
-                    unzipDirectory=str(self._folder),
+                    unzipDirectory=str(folder),
                     instanceName="mixed_order_game",
                 )
             slave.instantiate(callbacks=self._callbacks)
             self._slave = slave
         except Exception as error:  # fmpy raises bare Exceptions
-            said = self._said() or explained(error, self._folder)
-            self.close()
+            said = self._said() or explained(error, folder)
             raise SimulationError(f"{self.model.path} cannot be loaded: {said}") from error
-        self._used = False
+        if os.name == "posix":  # elsewhere a library that is in use cannot be removed
+            shutil.rmtree(folder, ignore_errors=True)
 
     def __enter__(self) -> Self:
         return self
@@ -134,9 +146,9 @@ class Simulator:
         self.close()
 
     def close(self) -> None:
-        """Free the instance and remove the unpacked files. Closing twice is allowed.
+        """Free the instance and remove what is left of the unpacked files. Closing twice is allowed.
 
-        In a forked process the files are its parent's and stay. Raises SimulationError from within a run.
+        In a forked process nothing is freed: that is its parent's. Raises SimulationError from within a run.
         """
         if os.getpid() != self._process:
             self._slave = None
@@ -148,7 +160,8 @@ class Simulator:
         if self._slave is not None:
             self._slave.freeInstance()
             self._slave = None
-        shutil.rmtree(self._folder, ignore_errors=True)
+        if self._folder is not None:
+            shutil.rmtree(self._folder, ignore_errors=True)
 
     @in_turn
     def run(
@@ -209,22 +222,24 @@ class Simulator:
         points = np.union1d(time, [*schedule, *disturbance.times]).tolist()
 
         try:
-            self._initialize({name: parameters[name] for name in start}, time, tolerance)
-            disturbance.set(self._slave, points[0])
-            self._slave.exitInitializationMode()
-            recorder.read(0)
-            sample = 1
-            for begin, end in pairwise(points):
-                disturbance.set(self._slave, begin)
-                if begin in schedule:
-                    self._set(schedule[begin])
-                self._slave.doStep(begin, end - begin)
-                if end == time[sample]:
-                    recorder.read(sample)
-                    sample += 1
-                    if progress is not None:
-                        progress(end)
-            self._slave.terminate()
+            with noted_signals() as take_signals:
+                self._initialize({name: parameters[name] for name in start}, time, tolerance)
+                disturbance.set(self._slave, points[0])
+                self._slave.exitInitializationMode()
+                recorder.read(0)
+                sample = 1
+                for begin, end in pairwise(points):
+                    take_signals()
+                    disturbance.set(self._slave, begin)
+                    if begin in schedule:
+                        self._set(schedule[begin])
+                    self._slave.doStep(begin, end - begin)
+                    if end == time[sample]:
+                        recorder.read(sample)
+                        sample += 1
+                        if progress is not None:
+                            progress(end)
+                self._slave.terminate()
         except FMICallException as error:
             raise SimulationError(self._said() or str(error)) from error
 

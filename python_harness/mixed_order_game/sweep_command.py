@@ -8,6 +8,7 @@ import typer
 
 from .designs import Sampling
 from .graphs import GRAPHS_HELP
+from .interrupts import INTERRUPTED
 from .shared_options import (
     BandOption,
     ForceOption,
@@ -175,7 +176,7 @@ def sweep(
             )
     except KeyboardInterrupt:
         typer.echo(f"mog: interrupted; the same command goes on with the rows in {output}", err=True)
-        raise typer.Exit(1) from None
+        raise typer.Exit(INTERRUPTED) from None
     _show(result, definition, maps, as_json=as_json, force=force)
 
 

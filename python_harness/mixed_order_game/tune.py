@@ -19,6 +19,7 @@ from .arguments import number_argument
 from .designs import Range
 from .errors import MixedOrderGameError, SimulationError
 from .graphs import CommunicationGraph, graph_of
+from .interrupts import noted_signals
 from .metrics import SETTLED, Metrics
 from .model import Value, check_value
 from .parameters import GameParameters, game_parameters
@@ -95,6 +96,7 @@ class Tuned:
     start_metrics: tuple[Metrics | None, ...]
     slowest_rate: float  # 1/s, smallest over the graphs: minus the spectral abscissa of the linear loop
     simulations: int = field(default=0)
+    interrupted: bool = False  # by Ctrl-C: the gains are the best so far
 
     @property
     def met(self) -> bool:
@@ -178,6 +180,7 @@ class Tuned:
             "slowest_rate": self.slowest_rate,
             "graphs": len(self.graphs),
             "simulations": self.simulations,
+            "interrupted": self.interrupted,
             "worst_graph": self.graphs[self.worst].label,
             "metrics": None if worst is None else worst.as_json(),
             "start_gains": dict(self.start_gains),
@@ -211,6 +214,8 @@ def tune(
     largest_error: of |x - x*| in the last fifth of the runs that verify; default any.
     stop_time: length of the runs that verify, in s; default four times settling_time, at least 2 s.
     jobs: processes that simulate many graphs; a script that asks for several guards its main module.
+    Ctrl-C ends the search with the best gains that were simulated on every graph so far, or raises
+    KeyboardInterrupt before the first.
     Raises TuneError for a wish without sense, VariableError for gains and values that the FMU does not take,
     GraphError for graphs that it does not take.
     """
@@ -253,6 +258,8 @@ class _Search:
         self.fixed = dict(start_values)
         self.names = tuple(gains)
         self.simulations = 0
+        self.best: tuple[dict[str, float], list[Metrics | None]] | None = None  # on all graphs, so far
+        self.take_signals: Callable[[], None] = lambda: None
         self.sampler = Sampler(fmu)
         try:
             self._prepare(graphs, ranges, band)
@@ -302,15 +309,18 @@ class _Search:
         self.start = {name: float(model.start_values(self.fixed)[name]) for name in self.names}
 
     def run(self, seed: int, progress: Progress) -> Tuned:
-        """Both stages."""
-        start_metrics = self.simulate(self.start)
-        point, found = self._robust(seed, progress)
-        for _ in range(REPEATS):
-            worth = self._worth(found)
-            point, found = self._polished(point, found, progress)
-            if self._exact_enough(found) or self._worth(found) >= worth:
-                break
-        gains = self.gains(point)
+        """Both stages, or what is known when Ctrl-C comes."""
+        start_metrics: list[Metrics | None] = []
+        interrupted = False
+        try:
+            with noted_signals() as self.take_signals:
+                start_metrics = self.simulate(self.start)
+                gains, found = self._sought(seed, progress)
+        except KeyboardInterrupt:
+            if self.best is None:
+                raise
+            gains, found = self.best
+            interrupted = True
         return Tuned(
             gains=gains,
             ranges=self.box,
@@ -322,7 +332,17 @@ class _Search:
             start_metrics=tuple(start_metrics),
             slowest_rate=min(-spectral_abscissa(linear_loop(self.parameters(gains, a))) for a in self.loops),
             simulations=self.simulations,
+            interrupted=interrupted,
         )
+
+    def _sought(self, seed: int, progress: Progress) -> tuple[dict[str, float], list[Metrics | None]]:
+        point, found = self._robust(seed, progress)
+        for _ in range(REPEATS):
+            worth = self._worth(found)
+            point, found = self._polished(point, found, progress)
+            if self._exact_enough(found) or self._worth(found) >= worth:
+                break
+        return self.gains(point), found
 
     def gains(self, point: FloatArray) -> dict[str, float]:
         """Gains of a point, rounded to four digits, within the box."""
@@ -390,6 +410,7 @@ class _Search:
             return point
 
         def cost(part: FloatArray) -> float:
+            self.take_signals()
             point[linear] = part
             return max(self._linear_cost(point, self.loops[k], target) for k in active)
 
@@ -471,7 +492,11 @@ class _Search:
             nonlocal runs
             runs += 1
             progress("polishing", min(1.0, runs / POLISH_RUNS))
-            return self._worth([self._one(self.gains(trial), k) for k in sorted(hardest)]) - scale
+            gains = self.gains(trial)
+            trials = [self._one(gains, k) for k in sorted(hardest)]
+            if len(hardest) == len(self.graphs):
+                self._consider(gains, trials)
+            return self._worth(trials) - scale
 
         step = CHEAPER if self._exact_enough(found) else FARTHER
         simplex = np.vstack([point, point + np.diag(np.full(len(point), step))])
@@ -505,6 +530,7 @@ class _Search:
         return self.largest_error is None or _final_error(found) <= self.largest_error
 
     def _one(self, gains: Mapping[str, float], graph: int) -> Metrics | None:
+        self.take_signals()
         self.simulations += 1
         try:
             return self.sampler.measure({**self.fixed, **self.edges[graph], **gains}, self.settings)
@@ -512,7 +538,17 @@ class _Search:
             return None
 
     def simulate(self, gains: Mapping[str, float]) -> list[Metrics | None]:
-        """Figures of every graph's run, in this process or, for many graphs, in several."""
+        """Figures of every graph's run; the best so far is kept."""
+        found = self._simulated(gains)
+        self._consider(gains, found)
+        return found
+
+    def _consider(self, gains: Mapping[str, float], found: list[Metrics | None]) -> None:
+        if self.best is None or self._worth(found) < self._worth(self.best[1]):
+            self.best = dict(gains), found
+
+    def _simulated(self, gains: Mapping[str, float]) -> list[Metrics | None]:
+        """In this process or, for many graphs, in several."""
         if self.jobs == 1 or len(self.graphs) < 16:  # noqa: PLR2004 - starting processes costs as much
             return [self._one(gains, k) for k in range(len(self.graphs))]
         values = [{**self.fixed, **edges, **gains} for edges in self.edges]
@@ -520,7 +556,8 @@ class _Search:
         found: list[Metrics | None] = [None] * len(values)
         pool = open_pool(self.sampler.model.path, jobs=self.jobs)
         try:
-            for outcomes in run_cases(pool, self.settings, [Case(k, each) for k, each in enumerate(values)]):
+            cases = [Case(k, each) for k, each in enumerate(values)]
+            for outcomes in run_cases(pool, self.settings, cases, ready=self.take_signals):
                 for outcome in outcomes:
                     found[outcome.row] = outcome.metrics
         finally:

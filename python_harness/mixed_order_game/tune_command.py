@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from .graphs import GRAPHS_HELP
+from .interrupts import INTERRUPTED
 from .shared_options import BandOption, GameArgument, SettingsOption
 
 if TYPE_CHECKING:
@@ -100,6 +101,9 @@ def tune(
         typer.echo(json.dumps(found.as_json(), indent=2))
     else:
         _print(found)
+    if found.interrupted:
+        typer.echo("mog: interrupted; these are the best gains so far", err=True)
+        raise typer.Exit(INTERRUPTED)
     if not found.met:
         wishes = "" if found.settles else f" to settle within {found.wish:g} s"
         if not found.exact:

@@ -5,6 +5,7 @@ from pathlib import Path
 
 from ..bounds import bounds
 from ..graphs import all_connected
+from ..interrupts import noted_signals
 from ..model import Value, read_model
 from ..parameters import game_parameters
 from .definition import Sweep
@@ -34,10 +35,11 @@ def sweep(
     keep the call below `if __name__ == "__main__":` there.
     scheduler: address of a Dask scheduler, such as tcp://127.0.0.1:8786, whose workers run the rows instead.
     work: what a worker does with a chunk of rows, a function that it can import.
+    Ctrl-C raises KeyboardInterrupt between two rows; the rows that are finished are in the folder.
     Raises SweepError for a folder with other contents, PoolError for workers that cannot be had.
     """
     output = Path(output)
-    with locked(output):
+    with locked(output), noted_signals() as take_signals:
         store = Store(output, definition, restart=restart)
         finished = store.finished()
         cases = [definition.case(row) for row in range(definition.rows) if row not in finished]
@@ -47,7 +49,7 @@ def sweep(
         if cases:
             pool = open_pool(definition.model.path, jobs=jobs, scheduler=scheduler, work=work)
             try:
-                for outcomes in run_cases(pool, definition.settings, cases):
+                for outcomes in run_cases(pool, definition.settings, cases, ready=take_signals):
                     store.append(outcomes)
                     done += len(outcomes)
                     if progress is not None:

@@ -26,6 +26,7 @@ from time import thread_time
 from typing import Any, Protocol
 
 from ..errors import MixedOrderGameError, ModelError, SimulationError
+from ..interrupts import blocked_interrupt
 from ..metrics import Metrics
 from ..model import Value
 from ..version import package_version
@@ -34,6 +35,9 @@ from .sampler import Sampler, Settings
 LARGEST_CHUNK = 16
 CHUNKS_PER_WORKER = 16
 QUEUED_PER_WORKER = 2
+READY_EVERY = 0.1
+"""Time in s after which run_cases tells again that it is ready for a signal."""
+
 DEATHS_IN_A_ROW = 10
 """Deaths of workers without one finished run in between that end a sweep: then the machine is to blame."""
 
@@ -146,7 +150,8 @@ class LocalPool:
 
     def submit(self, settings: Settings, cases: Sequence[Case]) -> "Future[list[Outcome]]":
         """Give a chunk to a worker."""
-        return self._executor.submit(self._work, self._source, settings, cases)
+        with blocked_interrupt():  # for the workers that are started here, which import for a while first
+            return self._executor.submit(self._work, self._source, settings, cases)
 
     def died(self, error: BaseException) -> bool:
         """Whether a future failed because a worker died; which one of them is not known."""
@@ -288,22 +293,36 @@ def usable_cores() -> int:
 
 
 def run_cases(
-    pool: Pool, settings: Settings, cases: Sequence[Case], *, chunk: int | None = None
+    pool: Pool,
+    settings: Settings,
+    cases: Sequence[Case],
+    *,
+    chunk: int | None = None,
+    ready: Callable[[], None] = lambda: None,
 ) -> Iterator[list[Outcome]]:
     """Run cases and give their outcomes in chunks as they finish; every case has one outcome in the end.
 
+    ready: called several times a second where an exception that it raises loses nothing.
     Raises VariableError for values that the FMU does not take, PoolError if workers die whatever they run.
     """
     size = chunk or max(1, min(LARGEST_CHUNK, len(cases) // (pool.workers * CHUNKS_PER_WORKER)))
-    return _Dispatch(pool, settings, [cases[k : k + size] for k in range(0, len(cases), size)]).outcomes()
+    chunks = [cases[k : k + size] for k in range(0, len(cases), size)]
+    return _Dispatch(pool, settings, chunks, ready).outcomes()
 
 
 class _Dispatch:
     """Chunks that wait and chunks that run. What a dead worker lost waits again, one row a chunk."""
 
-    def __init__(self, pool: Pool, settings: Settings, chunks: Iterable[Sequence[Case]]) -> None:
+    def __init__(
+        self,
+        pool: Pool,
+        settings: Settings,
+        chunks: Iterable[Sequence[Case]],
+        ready: Callable[[], None],
+    ) -> None:
         self._pool = pool
         self._settings = settings
+        self._ready = ready
         self._waiting = deque(chunks)
         self._running: dict[Future[list[Outcome]], Sequence[Case]] = {}
         self._lost: list[Sequence[Case]] = []
@@ -314,13 +333,20 @@ class _Dispatch:
             while self._waiting or self._running:
                 self._fill()
                 if self._running and not self._lost:
-                    done = wait(self._running, return_when=FIRST_COMPLETED).done
-                    yield from self._collect(done)
+                    yield from self._collect(self._wait_for(self._running))
                 if self._lost:
                     yield from self._recover()
         finally:
             for future in self._running:
                 future.cancel()
+
+    def _wait_for(self, futures: Iterable["Future[list[Outcome]]"]) -> Iterable["Future[list[Outcome]]"]:
+        """Those of the futures that have ended, as soon as one has."""
+        while True:
+            self._ready()
+            done = wait(futures, timeout=READY_EVERY, return_when=FIRST_COMPLETED).done
+            if done:
+                return done
 
     def _fill(self) -> None:
         """Keep the workers busy, until the pool turns out to be broken."""
@@ -353,11 +379,22 @@ class _Dispatch:
             if len(chunk) > 1:
                 self._waiting.extendleft([case] for case in chunk)
                 continue
-            outcome = _alone(self._pool, self._settings, chunk[0])
+            outcome = self._alone(chunk[0])
             self._deaths = self._deaths + 1 if outcome.status == WORKER_DIED else 0
             if self._deaths == DEATHS_IN_A_ROW:
                 raise PoolError(f"{self._deaths} workers died in a row without finishing a run")
             yield [outcome]
+
+    def _alone(self, case: Case) -> Outcome:
+        """Run a case while nothing else of ours can kill its worker; told as failed if it still dies."""
+        with contextlib.suppress(BrokenProcessPool):
+            future = self._pool.submit(self._settings, [case])
+            self._wait_for([future])
+            outcomes = _outcomes(self._pool, future)
+            if outcomes is not None:
+                return outcomes[0]
+        self._pool.revive()
+        return Outcome(case.row, None, WORKER_DIED, float("nan"))
 
 
 def _outcomes(pool: Pool, future: "Future[list[Outcome]]") -> list[Outcome] | None:
@@ -368,16 +405,6 @@ def _outcomes(pool: Pool, future: "Future[list[Outcome]]") -> list[Outcome] | No
         if pool.died(error):
             return None
         raise
-
-
-def _alone(pool: Pool, settings: Settings, case: Case) -> Outcome:
-    """Run a case while nothing else of ours can kill its worker; told as failed if it dies all the same."""
-    with contextlib.suppress(BrokenProcessPool):
-        outcomes = _outcomes(pool, pool.submit(settings, [case]))
-        if outcomes is not None:
-            return outcomes[0]
-    pool.revive()
-    return Outcome(case.row, None, WORKER_DIED, float("nan"))
 
 
 def _fingerprint(fmu: Path) -> str:
