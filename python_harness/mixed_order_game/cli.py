@@ -94,7 +94,8 @@ def root(
 ) -> None:
     """Distributed Nash equilibrium seeking for mixed-order games, as an FMU.
 
-    Every command takes an FMU or a game file, and the paper's example when given neither.
+    Commands that run or show a game take an FMU, a game file or a game of the package by name, and the
+    paper's example when given none.
     """
 
 

@@ -344,7 +344,7 @@ PAPER_EXAMPLE_PROVENANCE = (
     Provenance("robust term", ("delta", "epsilon"), "the paper's"),
     Provenance("initial actions and velocities", ("x0", "v0"), "the paper's"),
     Provenance("gains", ("k1", "k2", "k3", "k4"), "ours: the paper prints none"),
-    Provenance("communication graph", ("a",), "ours: the paper's figure is lost"),
+    Provenance("communication graph", ("a",), "ours: the paper's figure was not at hand"),
     Provenance("initial references and estimates", ("z0", "y0"), "ours: zero, the paper does not say"),
 )
 """The paper's example group by group: which values are printed in the paper and which are decided here."""

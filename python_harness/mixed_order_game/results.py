@@ -109,10 +109,15 @@ class Result:
     @property
     def v(self) -> FloatArray:
         """Velocities, (T, N, D), 1/s; NaN for order 1, or everywhere if no player has order 2."""
-        accelerated = indices_of(self.columns, "v") or indices_of(self.parameters, "v0")
-        if not accelerated and indices_of(self.columns, "u"):
+        if not indices_of(self.columns, "v") and self._all_first_order:
             return np.full((len(self.time), self.players, self.dimension), np.nan)
         return self._signal("v")
+
+    @property
+    def _all_first_order(self) -> bool:
+        """Whether it is known that no player has order 2."""
+        references = len(indices_of(self.columns, "z")) == self.players * self.dimension
+        return references or (bool(self.parameters) and not indices_of(self.parameters, "v0"))
 
     @property
     def z(self) -> FloatArray:
@@ -314,7 +319,7 @@ def _optional(package: str) -> Any:
     try:
         return importlib.import_module(package)
     except ImportError as error:
-        raise ResultError(f"this needs {package}: pip install mixed-order-game[tables]") from error
+        raise ResultError(f"this needs {package}: pip install {package}") from error
 
 
 def _largest(array: FloatArray, chosen: NDArray[np.bool_]) -> float:

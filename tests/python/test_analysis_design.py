@@ -230,6 +230,13 @@ def test_analysis_of_the_example(fmu: Path) -> None:
     for each in found.demonstrations:
         assert each.complete
         assert each.seen_radius < each.design.radius
+    # What the run cannot resolve is not told as seen: 1e-11 (0.5 + 0.01) for each of ten entries.
+    assert found.value("design: the paper's constants", "run's tolerance") == pytest.approx(
+        1.6127e-11, rel=1e-3
+    )
+    assert (
+        "seen less than the run's tolerance 1.61e-11, more than 6.2e+09 times smaller" in found.verdicts[-1]
+    )
     # The printed level asks K = (N D epsilon + 4 N D W_max) / (0.1 / 2)^2 and with it an absurd k4.
     assert found.value("theorem 1", "K asked by print") == pytest.approx(8.00004e6)
     assert 1e27 < float(found.value("theorem 1", "k4 asked by print")) < 1e28

@@ -64,9 +64,14 @@ def test_shapes_and_indices() -> None:
 def test_all_first_order_have_no_velocity() -> None:
     result = make()
     columns = {name: column for name, column in result.columns.items() if not name.startswith("v")}
-    alone = Result(time=result.time, columns=columns)
+    alone = Result(time=result.time, columns=columns, parameters={"z0[1,1]": 0.0})
     assert np.isnan(alone.v).all()
     assert alone.largest_velocity() == 0.0
+    # A file without parameters tells it by the references; where nothing does, velocities may be left out.
+    references = {f"z[{i},{k}]": columns["x[1,1]"] for i in range(1, 4) for k in (1, 2)}
+    assert np.isnan(Result(time=result.time, columns=columns | references).v).all()
+    with pytest.raises(ResultError, match="v was not recorded"):
+        _ = Result(time=result.time, columns=columns).v
 
 
 @pytest.mark.parametrize("suffix", [".csv", ".parquet"])

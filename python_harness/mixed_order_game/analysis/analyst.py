@@ -49,7 +49,7 @@ from .hypotheses import (
 from .lyapunov import scaled_identity
 from .network_fit import NetworkFit, least_squares_fit, mirror_bound, trajectory_fit
 from .paper_bounds import ORDER, Formula, PaperConstants, Thresholds
-from .simulation import Seen, simulate
+from .simulation import Seen, integration_error, simulate
 
 FloatArray = NDArray[np.float64]
 
@@ -520,19 +520,23 @@ class Analyst:
             self.verdicts.append(f"{told}; not simulated: {failure}.")
             return shown
         seen_radius = shown.seen_radius
-        conservatism = design.radius / max(seen_radius, np.finfo(float).tiny)
+        floor = integration_error(self.game.parameters)
+        conservatism = design.radius / max(seen_radius, floor)
         self._row(section, "seen radius", seen_radius, "L", "largest |x - x*| after that time in the run")
-        self._row(section, "conservatism", conservatism, "1", "guaranteed over seen radius")
+        self._row(section, "run's tolerance", floor, "L", "what the integrator may add to |x - x*|")
+        self._row(section, "conservatism", conservatism, "1", "guaranteed radius over the larger of the two")
         self._row(
             section, "seen max |y_i - x*|", float(seen.errors.largest_estimate.max()), "L", "within the set"
         )
         self._row(
             section, "seen max |u_il|", seen.largest_control, "L/s^order", "largest control, in the transient"
         )
-        self.verdicts.append(
-            f"{told}; seen {seen_radius:.3g}, {conservatism:.3g} times smaller"
-            f" (largest control {seen.largest_control:.3g})."
+        found = (
+            f"seen {seen_radius:.3g}, {conservatism:.3g} times smaller"
+            if seen_radius > floor
+            else f"seen less than the run's tolerance {floor:.3g}, more than {conservatism:.3g} times smaller"
         )
+        self.verdicts.append(f"{told}; {found} (largest control {seen.largest_control:.3g}).")
         return shown
 
     def _domain_rows(self, section: str, of: str, found: Domain) -> None:

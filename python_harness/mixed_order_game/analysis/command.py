@@ -35,7 +35,7 @@ def analyse(
     """Tell whether the gains suit the graph: thresholds of the theorems, exact spectrum, guaranteed radius.
 
     Compares the theorems' bounds with the exact spectrum and with runs, names every hypothesis that fails,
-    and designs gains that meet them all.
+    and seeks gains that meet them all.
 
     [bold]Examples:[/bold]
 

@@ -10,7 +10,9 @@ from numpy.typing import NDArray
 
 from ..errors import ModelError, SimulationError
 from ..model import Value
+from ..parameters import GameParameters
 from ..run import Simulator
+from ..spectrum import nash_equilibrium
 from .domain import LoopErrors, loop_errors
 from .game import AnalysedGame, Gains
 
@@ -108,6 +110,11 @@ def simulate(
         largest_control=float(np.abs(result.u).max()),
         steps=int(result["solver_steps"][-1]),
     )
+
+
+def integration_error(parameters: GameParameters) -> float:
+    """2-norm of what TOLERANCE, with a hundredth of it as absolute tolerance, allows as error of x at x*."""
+    return float(np.linalg.norm(TOLERANCE * (np.abs(nash_equilibrium(parameters)) + 0.01)))
 
 
 def _deadline(limit: float) -> Callable[[float], None]:

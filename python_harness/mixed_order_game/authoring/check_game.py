@@ -1,7 +1,8 @@
-"""Checks a game file and tells every problem with its line.
+"""Checks a game file and tells problems with their lines.
 
 The judge is the host tool that makes FMUs: a game is valid when it says so. It stops at the first problem and
-names the entry; the line comes from the file's syntax tree, and the JSON Schema finds the problems after it.
+names the entry; the line comes from the file's syntax tree, and the JSON Schema finds those after it that a
+schema can.
 """
 
 import difflib
@@ -44,7 +45,7 @@ class _Found:
 
 
 def check_game(game: Path | str) -> tuple[Problem, ...]:
-    """Every problem found in a game file, or in a game of the package by its name; empty if it is valid.
+    """The problems found in a game file, or in a game of the package by its name; empty if it is valid.
 
     Raises GameError if there is no such file, BuildError if the installation lacks the host tool.
     """

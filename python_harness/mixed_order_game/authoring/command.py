@@ -65,7 +65,7 @@ def new(
 def check(
     games: Annotated[list[Path], typer.Argument(help="Game files (.toml).", show_default=False)],
 ) -> None:
-    """Check game files: every problem with its line, exit code 1 if there is one.
+    """Check game files: tell problems with their lines, exit code 1 if there is one.
 
     [bold]Example:[/bold] mog check my_game.toml
     """

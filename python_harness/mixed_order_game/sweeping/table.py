@@ -115,7 +115,7 @@ class SweepResult:
         try:
             import pandas  # noqa: F401, ICN001 - pyarrow needs it
         except ImportError as error:
-            raise ResultError("this needs pandas: pip install mixed-order-game[tables]") from error
+            raise ResultError("this needs pandas: pip install pandas") from error
         frame: pd.DataFrame = self.table.to_pandas()
         return frame.set_index("row")
 
