@@ -22,7 +22,7 @@ from .errors import (
 from .model import Model, Variable, read_model
 from .results import Result, load
 from .run import Simulator, run
-from .validate import Claim, Validation, validate
+from .validate import Claim, Validation, Verdict, validate
 from .version import package_version
 
 __version__ = package_version()
@@ -42,6 +42,7 @@ __all__ = [
     "Validation",
     "Variable",
     "VariableError",
+    "Verdict",
     "build_fmu",
     "cached_fmu",
     "default_fmu",

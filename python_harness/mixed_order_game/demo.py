@@ -30,7 +30,8 @@ def demo(
     """Judge every claim on an FMU and write, into the folder output, what was found.
 
     claims.json, robust.parquet, unperturbed.parquet and the paper's figures (suffix .png, .pdf or .svg). They
-    replace files of their kind, with force any; that is judged before any run.
+    replace files of their kind, with force any; that is judged before any run. A run that ends early, or is
+    not made for want of an equilibrium, leaves out its file and the figures.
     progress is called with what is being done and the part of it done, 0 to 1.
     Raises what validate, Result.save and save_figure raise.
     """
@@ -41,14 +42,15 @@ def demo(
         check_output(output / name, kind, inputs=[Path(fmu)], force=force)
     validation = validate(fmu, progress=progress)
     claims = (json.dumps(validation.as_json(), indent=2) + "\n").encode()
-    files = [
-        validation.robust.save(output / "robust.parquet", force=force),
-        validation.plain.save(output / "unperturbed.parquet", force=force),
-        write_file(output / "claims.json", CLAIMS, lambda file: file.write(claims), force=force),
-    ]
-    figures = paper_figures(validation.robust, validation.plain)
-    for number, (name, axes) in enumerate(figures.items(), start=1):
-        files.append(save_figure(axes, output / f"{name}{suffix}", force=force))
-        if progress is not None:
-            progress("figures", number / len(figures))
+    files = [write_file(output / "claims.json", CLAIMS, lambda file: file.write(claims), force=force)]
+    robust, plain = validation.robust, validation.plain
+    for run, name in ((robust, "robust"), (plain, "unperturbed")):
+        if run is not None:
+            files.append(run.save(output / f"{name}.parquet", force=force))
+    if robust is not None and plain is not None:
+        figures = paper_figures(robust, plain)
+        for number, (name, axes) in enumerate(figures.items(), start=1):
+            files.append(save_figure(axes, output / f"{name}{suffix}", force=force))
+            if progress is not None:
+                progress("figures", number / len(figures))
     return Demo(validation, tuple(files))

@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 from rich.box import SIMPLE_HEAD as LINES
 from rich.console import Console
-from rich.table import Column, Table
+from rich.table import Table
 from rich.text import Text
 
 from .errors import ResultError
 from .model import Model, provenance
 from .results import Result
-from .validate import Validation
+from .validate import Validation, Verdict
 
 LONGEST_LIST = 20
 
@@ -108,19 +108,31 @@ def print_result(result: Result) -> None:
     console.print(table)
 
 
-def print_validation(verdict: Validation) -> None:
-    """Print every claim with its figure, its bound and whether it holds."""
+VERDICT_STYLES = {
+    Verdict.HOLDS: "green",
+    Verdict.FAILS: "bold red",
+    Verdict.NOT_COVERED: "yellow",
+    Verdict.NOT_SETTLED: "yellow",
+}
+
+
+def print_validation(validation: Validation) -> None:
+    """Print every claim with its verdict and the reason."""
     console = Console(highlight=False)
-    console.print(Text(verdict.model.title, style="bold"))
-    table = Table("", "claim", Column("figure", no_wrap=True), Column("bound", no_wrap=True), box=LINES)
-    for claim in verdict.claims:
-        mark = Text("holds", style="green") if claim.passed else Text("fails", style="bold red")
-        unit = "" if claim.unit == "1" else f" {claim.unit}"
-        bound = f"{claim.relation} {claim.bound:.4g}{unit}"
-        table.add_row(mark, Text(claim.statement), f"{claim.figure:.4g}", bound)
-    console.print(table)
-    for note in verdict.notes:
+    console.print(Text(validation.model.title, style="bold"))
+    console.print(claims_table(validation))
+    for note in validation.notes:
         console.print(Text(note))
+    console.print(Text(validation.summary() + "."))
+
+
+def claims_table(validation: Validation) -> Table:
+    """Verdict, claim and reason, a row each; every cell wraps."""
+    table = Table("", "claim", "reason", box=LINES)
+    for claim in validation.claims:
+        verdict = Text(claim.verdict.value, style=VERDICT_STYLES[claim.verdict])
+        table.add_row(verdict, Text(claim.statement), Text(claim.reason))
+    return table
 
 
 def _orders(order: Sequence[int]) -> str:

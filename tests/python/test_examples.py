@@ -5,12 +5,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from mixed_order_game.bounds import bounds
 from numpy.typing import NDArray
 from scipy.optimize import root
 
 from mixed_order_game import Simulator, build_fmu, read_model
 from mixed_order_game.authoring import Recipe, check_game, new_game
-from mixed_order_game.bounds import bounds
 from mixed_order_game.parameters import game_parameters
 from mixed_order_game.spectrum import linear_loop, monotonicity_constant, spectral_abscissa
 from tests.oracle.equilibrium import nash_equilibrium, strong_monotonicity_constant

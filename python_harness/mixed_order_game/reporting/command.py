@@ -34,7 +34,9 @@ def report(
     ] = None,
     claims: Annotated[  # noqa: FBT002 - the signature is the options
         bool,
-        typer.Option("--claims/--no-claims", help="Judge the paper's claims, which takes three more runs."),
+        typer.Option(
+            "--claims/--no-claims", help="Judge the paper's claims, which takes more and longer runs."
+        ),
     ] = True,
     force: ForceOption = False,  # noqa: FBT002
 ) -> None:
@@ -67,7 +69,7 @@ def report(
     )
     typer.echo(done.path)
     validation = done.evidence.validation
-    if validation is not None and not validation.passed:
-        failed = [claim.name for claim in validation.claims if not claim.passed]
-        typer.echo(f"mog: {', '.join(failed)} failed", err=True)
+    problem = "" if validation is None else validation.problem()
+    if problem:
+        typer.echo(f"mog: {problem}", err=True)
         raise typer.Exit(1)

@@ -7,14 +7,18 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from ..claims.perturbed_run import TOLERANCE
+from ..claims.unperturbed_loop import LARGEST_LINEAR_LOOP
+from ..claims.unperturbed_loop import TOLERANCE as PLAIN_TOLERANCE
 from ..errors import ResultError
 from ..model import Model, Value
 from ..names import parse_name
-from ..parameters import GameParameters, game_parameters
+from ..parameters import game_parameters
 from ..results import Result
 from ..run import Simulator
 from ..spectrum import linear_loop, spectral_abscissa
-from ..validate import LARGEST_LINEAR_LOOP, PLAIN_TOLERANCE, TOLERANCE, Validation, validate
+from ..unknown_term import unknown_term
+from ..validate import Validation, validate
 
 FloatArray = NDArray[np.float64]
 
@@ -46,7 +50,7 @@ class Evidence:
 
     @property
     def passed(self) -> bool:
-        """Whether every claim that was judged holds."""
+        """Whether no claim fails."""
         return self.validation is None or self.validation.passed
 
 
@@ -120,26 +124,6 @@ def evidence_of_result(result: Result) -> Evidence:
     )
 
 
-def unknown_term(game: GameParameters, result: Result) -> FloatArray:
-    """g_i(x(t)) + d_i(t) + d_ext along a run whose parameters do not change, (T, N, D).
-
-    g_i(x)_l = sum_j (G_ij,l x_jl + H_ij,l x_jl^2), d_il(t) = bias + amplitude sin(frequency t + phase).
-    """
-    shape = (game.players, game.dimension)
-    unknown = np.broadcast_to(_parameter(result, "d_ext", shape), (len(result.time), *shape)).copy()
-    if not result.parameters.get("perturbed", True):
-        return unknown
-    x = result.x
-    unknown += np.einsum("ijl,tjl->til", game.dynamics_linear, x)
-    unknown += np.einsum("ijl,tjl->til", game.dynamics_square, x * x)
-    bias, amplitude, frequency, phase = (
-        _parameter(result, f"disturbance_{name}", shape)
-        for name in ("bias", "amplitude", "frequency", "phase")
-    )
-    time = result.time[:, np.newaxis, np.newaxis]
-    return np.asarray(unknown + bias + amplitude * np.sin(frequency * time + phase))
-
-
 def shared_signal(result: Result) -> FloatArray | None:
     """xbar (T, N, D): z_i of order 1, x_i of order 2; None if z or x was not recorded."""
     try:
@@ -186,12 +170,3 @@ def _signals(model: Model) -> list[str]:
         and parse_name(variable.name)[0] != "W"
         and not variable.name.startswith("der(")
     ]
-
-
-def _parameter(result: Result, stem: str, shape: tuple[int, ...]) -> FloatArray:
-    values = np.zeros(shape)
-    for name, value in result.parameters.items():
-        each, index = parse_name(name)
-        if each == stem and index:
-            values[tuple(position - 1 for position in index)] = value
-    return values

@@ -36,7 +36,7 @@ class Report:
 
     @property
     def passed(self) -> bool:
-        """Whether every claim that was judged holds."""
+        """Whether no claim fails."""
         return self.evidence.passed
 
 
