@@ -67,7 +67,11 @@ class Validation:
         if self.holds:
             return "Every claim holds"
         counts = [(len(self.named(verdict)), verdict.value) for verdict in Verdict]
-        told = ", ".join(f"{count} {verdict}" for count, verdict in counts if count)
+        told = ", ".join(
+            f"{count} {verdict if count == 1 else verdict.removesuffix('s')}"
+            for count, verdict in counts
+            if count
+        )
         return f"Of {len(self.claims)} claims: {told}"
 
     def problem(self, *, strict: bool = False) -> str:

@@ -65,6 +65,7 @@ def test_installed_command(fmu: Path) -> None:
         ["run", "--stop-time", "soon"],
         ["run", "--output", "result.xlsx"],
         ["validate", "--neighbourhood", "-1"],
+        ["validate", "--limit", "0"],
         ["plot", "--format", "bmp"],
         ["plot", "--width", "wide"],
         ["build", "one.toml", "two.toml"],
@@ -186,14 +187,24 @@ def test_run_takes_a_game_or_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyP
 
 
 def test_validate(fmu: Path) -> None:
-    result = mog("validate", fmu)
+    result = mog("validate", fmu, "--strict")
     assert result.exit_code == 0, result.output
-    assert result.stdout.count("holds") == 10
-    failed = mog("validate", fmu, "--neighbourhood", 1e-5, "--json")
+    assert result.stdout.count("holds") == 9
+    assert "Every claim holds." in result.stdout
+    short = mog("validate", fmu, "--limit", 20, "--json")
+    assert short.exit_code == 0
+    data = json.loads(short.stdout)
+    assert (data["passed"], data["holds"]) == (True, False)
+    strict = mog("validate", fmu, "--limit", 20, "--strict")
+    assert strict.exit_code == 1
+    signals = ("actions", "velocities", "estimates")
+    assert (
+        strict.stderr
+        == f"mog: {', '.join(f'practical_convergence_{each}' for each in signals)}: not settled\n"
+    )
+    failed = mog("validate", fmu, "--neighbourhood", 1e-5)
     assert failed.exit_code == 1
-    assert failed.stderr == "mog: theorem_1_actions failed\n"
-    data = json.loads(failed.stdout)
-    assert data["passed"] is False
+    assert failed.stderr == "mog: neighbourhood: fails\n"
 
 
 def test_plot_of_game_and_results(fmu: Path, tmp_path: Path) -> None:
@@ -221,7 +232,7 @@ def test_demo(fmu: Path, tmp_path: Path) -> None:
     assert result.exit_code == 0, result.output
     names = {path.name for path in (tmp_path / "demo").iterdir()}
     assert {"claims.json", "robust.parquet", "unperturbed.parquet", "positions_robust.png"} <= names
-    assert result.stdout.count("holds") == 10
+    assert result.stdout.count("holds") == 9
     assert json.loads((tmp_path / "demo" / "claims.json").read_text())["passed"] is True
     (tmp_path / "file").write_text("")
     sentence(mog("demo", "--fmu", fmu, "--output", tmp_path / "file"))

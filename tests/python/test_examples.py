@@ -5,7 +5,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from mixed_order_game.bounds import bounds
 from numpy.typing import NDArray
 from scipy.optimize import root
 
@@ -164,7 +163,7 @@ def test_is_valid_stable_and_converges_through_the_fmu(
     assert monotonicity_constant(game) > 0.0
     if game.players < 10:  # large loops take long; the run below shows what their eigenvalues would
         assert spectral_abscissa(linear_loop(game)) < -0.5
-    limits = bounds(model, game)
+    late_time = 0.8 * model.stop_time
     with Simulator(fmu) as simulator:
         robust = simulator.run(outputs=["x", "W_norm2", "nash_error"])
         plain = simulator.run(
@@ -172,8 +171,8 @@ def test_is_valid_stable_and_converges_through_the_fmu(
         )
         bare = simulator.run(start_values={"robust": False}, outputs=["x"])
     expected = nash_equilibrium(read_game(GAMES / f"{name}.toml"))
-    late = robust.window(limits.settle_time, np.inf)
-    assert np.abs(robust.x[late] - expected).max() < limits.neighbourhood < 0.01
+    late = robust.window(late_time, np.inf)
+    assert np.abs(robust.x[late] - expected).max() < 0.005
     assert np.abs(plain.x[-1] - expected).max() < 1e-6
     assert robust.W_norm2.max() <= game.W_max * (1.0 + 1e-9)
-    assert bare.largest_error(limits.settle_time) > 20.0 * robust.largest_error(limits.settle_time)
+    assert bare.largest_error(late_time) > 20.0 * robust.largest_error(late_time)

@@ -55,5 +55,5 @@ def test_it_finds_what_it_tells(executed: Any) -> None:
     (page,) = outputs(executed, "report(fmu")
     assert page.data["text/plain"] == "(True, True)"
     (claims,) = outputs(executed, "verdict = mog.validate(fmu)")
-    assert claims.text.count("holds") == 10
-    assert "fails" not in claims.text
+    assert claims.text.count("holds |") == len(claims.text.splitlines()) - 1 == 8
+    assert "Explanation" in claims.text

@@ -16,13 +16,14 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner, Result
 
-from mixed_order_game import GameError, ResultError, build_fmu, read_model, run
+from mixed_order_game import GameError, ResultError, Verdict, build_fmu, read_model, run
 from mixed_order_game.authoring import Recipe, new_game
 from mixed_order_game.cli import app
 from mixed_order_game.parameters import game_parameters
 from mixed_order_game.reporting import Evidence, evidence_of_game, evidence_of_result, render_page, report
-from mixed_order_game.reporting.evidence import energy_so_far, shared_signal, sphere_switches, unknown_term
+from mixed_order_game.reporting.evidence import energy_so_far, shared_signal, sphere_switches
 from mixed_order_game.reporting.figures import MOST_PLAYERS, figures
+from mixed_order_game.unknown_term import unknown_term
 
 EVERY_FIGURE = [
     "actions",
@@ -187,6 +188,7 @@ def test_the_page_tells_claims_parameters_and_provenance(page: Path, evidence: E
     assert evidence.validation is not None
     for claim in evidence.validation.claims:
         assert claim.statement in text
+        assert claim.reason in text
     for part in (
         "Communication graph: 1-2, 1-5, 2-3, 3-4, 4-5",
         "ours: the paper prints none",
@@ -212,10 +214,10 @@ def test_changed_parameters_are_listed_and_the_claims_left_out(fmu: Path) -> Non
 def test_a_claim_that_fails_is_told(evidence: Evidence) -> None:
     assert evidence.validation is not None
     first, *rest = evidence.validation.claims
-    failed = replace(evidence.validation, claims=(replace(first, passed=False), *rest))
+    failed = replace(evidence.validation, claims=(replace(first, verdict=Verdict.FAILS), *rest))
     broken = replace(evidence, validation=failed)
     assert not broken.passed
-    assert f"1 of {len(failed.claims)} claims fail" in Elements(render_page(broken)).text
+    assert f"Of {len(failed.claims)} claims: {len(rest)} hold, 1 fails" in Elements(render_page(broken)).text
 
 
 def test_stored_results(fmu: Path, tmp_path: Path) -> None:
@@ -415,8 +417,8 @@ def test_command_fails_with_the_claims(tmp_path: Path) -> None:
     output = tmp_path / "slow.html"
     done = mog("report", game, "-o", output)
     assert (done.exit_code, done.stdout) == (1, f"{output}\n")
-    assert re.fullmatch(r"mog: .*theorem_2_stability.* failed\n", done.stderr)
-    assert "claims fail" in Elements(output.read_text(encoding="utf-8")).text
+    assert re.fullmatch(r"mog: .*theorem_2_stability.*: fails\n", done.stderr)
+    assert "fails" in Elements(output.read_text(encoding="utf-8")).text
 
 
 @pytest.mark.parametrize(

@@ -102,7 +102,7 @@ def observe(
         ready = own.actions.agree and own.residual.agree and SHORTEST * window <= stop
         if not ready or (not own.settled and stop < limit):
             continue
-        if own.residual.largest >= game.delta:
+        if _saturates(own, game.delta, ""):
             break
         thinner = run("a quarter of epsilon", QUARTER * game.epsilon, stop)
         seen = Observed(game, limit, window, dominates, own, thinner)
@@ -196,7 +196,7 @@ def _grows(run: PerturbedRun, signal: str) -> Found:
 
 def _saturates(run: PerturbedRun, delta: float, which: str) -> Found:
     residual = run.residual.largest
-    if residual < delta:
+    if residual < delta or residual <= run.residual.floor:
         return None
     return Verdict.NOT_COVERED, (
         f"{which}The residual g + d - W'S reaches {residual:.3g} {_by(run)} and delta is {delta:.3g}: "
