@@ -10,13 +10,13 @@ from pathlib import Path
 from typing import Any
 
 from .claims.archive import archive_valid
+from .claims.early_end import Ended, run_or_end
 from .claims.equilibrium import nash_equilibrium_exists
 from .claims.explanation import explain
 from .claims.neighbourhood import within_neighbourhood
 from .claims.perturbed_run import TOLERANCE, PerturbedRun
 from .claims.practical_convergence import Observed, nothing_to_observe, observe, practical_convergence
 from .claims.unperturbed_loop import (
-    Spectrum,
     spectrum_of,
     unperturbed_actions_converge,
     unperturbed_loop_stable,
@@ -28,7 +28,7 @@ from .errors import SimulationError
 from .model import Model
 from .parameters import GameParameters, game_parameters
 from .results import Result
-from .run import Simulator
+from .run import Progress, Simulator
 
 __all__ = ["LIMIT", "Claim", "Validation", "Verdict", "validate"]
 
@@ -123,28 +123,26 @@ def validate(
         if equilibrium.verdict is Verdict.FAILS:
             claims = [
                 equilibrium,
-                *nothing_to_observe(game, Verdict.FAILS, f"There is no equilibrium: {equilibrium.reason}"),
+                *nothing_to_observe(game, Verdict.FAILS, equilibrium.reason),
                 archive_valid(model.path),
             ]
             return Validation(model, tuple(claims), (), None, None)
         spectrum = spectrum_of(game)
-        robust = _default_experiment(simulator, progress)
-        observed = None
-        if not spectrum.unstable:
+        plain = unperturbed_run(simulator, game, spectrum, progress=progress)
+        stability = unperturbed_loop_stable(game, spectrum)
+        convergence = unperturbed_actions_converge(game, spectrum, plain)
+        robust = _default_experiment(simulator, game, progress)
+        observed, practical = None, _practical_despite(game, stability, convergence)
+        if not practical:
             observed = observe(
                 simulator, game, slowest_rate=spectrum.slowest_rate, limit=limit, progress=progress
             )
-        plain = unperturbed_run(simulator, spectrum, progress=progress)
-    claims = [equilibrium, *_theorem_1(game, spectrum, observed)]
+            practical = practical_convergence(observed)
+    claims = [equilibrium, *practical]
     if neighbourhood is not None:
-        claims.append(within_neighbourhood(claims[1], neighbourhood))
+        claims.append(within_neighbourhood(practical[0], neighbourhood))
     runs = [run.result for run in _runs(observed)] + ([robust] if isinstance(robust, Result) else [])
-    claims += [
-        weights_bounded(runs, game),
-        unperturbed_loop_stable(game, spectrum),
-        unperturbed_actions_converge(game, spectrum, plain),
-        archive_valid(model.path),
-    ]
+    claims += [weights_bounded(runs, game), stability, convergence, archive_valid(model.path)]
     return Validation(
         model=model,
         claims=tuple(claims),
@@ -154,26 +152,41 @@ def validate(
     )
 
 
-def _default_experiment(simulator: Simulator, progress: Report | None) -> Result | SimulationError:
+def _default_experiment(
+    simulator: Simulator, game: GameParameters, progress: Report | None
+) -> Result | Ended:
     model = simulator.model
-    try:
+
+    def run(stop: float, follow: Progress) -> Result:
         return simulator.run(
             start_values={"robust": True, "perturbed": True},
-            stop_time=model.stop_time,
+            stop_time=stop,
             step=model.step,
             tolerance=TOLERANCE,
-            progress=None if progress is None else lambda time: progress("default", time / model.stop_time),
+            progress=follow,
         )
-    except SimulationError as error:
-        return error
+
+    def report(time: float) -> None:
+        if progress is not None:
+            progress("default", time / model.stop_time)
+
+    return run_or_end(run, game, model.stop_time, report)
 
 
-def _theorem_1(game: GameParameters, spectrum: Spectrum, observed: Observed | None) -> list[Claim]:
-    if observed is not None:
-        return practical_convergence(observed)
+def _practical_despite(game: GameParameters, stability: Claim, convergence: Claim) -> list[Claim]:
+    """Theorem 1's claims where Theorem 2's decide them already, by an unstable loop; empty where not.
+
+    Large loops are not examined for stability: there the actions that leave x* show it.
+    """
+    if stability.verdict is Verdict.FAILS:
+        unstable = f"spectral abscissa {stability.figures['abscissa']:.4g} 1/s"
+    elif stability.verdict is Verdict.NOT_COVERED and convergence.verdict is Verdict.FAILS:
+        unstable = "its actions leave x*"
+    else:
+        return []
     reason = (
-        f"The unperturbed loop is unstable, spectral abscissa {spectrum.abscissa:.4g} 1/s, and the robust "
-        "part, being bounded, cannot hold actions that are far enough from x*."
+        f"The unperturbed loop is unstable, {unstable}, and the robust part, being bounded, cannot hold "
+        "actions that are far enough from x*."
     )
     return nothing_to_observe(game, Verdict.FAILS, reason)
 

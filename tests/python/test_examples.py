@@ -172,7 +172,7 @@ def test_is_valid_stable_and_converges_through_the_fmu(
         bare = simulator.run(start_values={"robust": False}, outputs=["x"])
     expected = nash_equilibrium(read_game(GAMES / f"{name}.toml"))
     late = robust.window(late_time, np.inf)
-    assert np.abs(robust.x[late] - expected).max() < 0.005
+    assert np.abs(robust.x[late] - expected).max() < 0.01
     assert np.abs(plain.x[-1] - expected).max() < 1e-6
     assert robust.W_norm2.max() <= game.W_max * (1.0 + 1e-9)
     assert bare.largest_error(late_time) > 20.0 * robust.largest_error(late_time)

@@ -1,17 +1,17 @@
 """A run of the robust strategy against its perturbations, and what is measured on its last windows."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import SimulationError
 from ..parameters import GameParameters
 from ..results import Result
-from ..run import Simulator
-from ..spectrum import gradient_map, nash_equilibrium
+from ..run import Progress, Simulator
+from ..spectrum import gradient_map
 from ..unknown_term import unknown_term
+from .early_end import Ended, run_or_end
 from .settling import WINDOWS, Maxima, window_maxima, window_of
 
 FloatArray = NDArray[np.float64]
@@ -21,9 +21,6 @@ TOLERANCE = 1e-8
 
 RESOLVED = 10.0
 """Errors of this many tolerances are above those of the integrator."""
-
-ESCAPED = 10.0
-"""A run that ends early has escaped if |x - x*| had grown to this many times the size of the actions."""
 
 PER_WINDOW = 200
 PER_PERIOD = 50
@@ -62,26 +59,6 @@ class PerturbedRun:
         return all(each.agree for each in (self.actions, self.residual, self.velocities, self.estimates))
 
 
-@dataclass(frozen=True)
-class Ended:
-    """A run that the FMU gave up."""
-
-    time: float  # s, the last sample
-    start: float  # largest |x - x*| at 0
-    error: float  # and at that sample
-    size: float  # of the actions of the game: largest of start, |x*| and 1
-    message: str  # the FMU's
-
-    @property
-    def escaped(self) -> bool:
-        """Whether the actions were leaving."""
-        return not self.error < ESCAPED * self.size
-
-    def __str__(self) -> str:
-        far = f", {self.error:.3g} from x* after a start at {self.start:.3g}" if self.escaped else ""
-        return f"The run ended at {self.time:.4g} s{far}: {self.message}"
-
-
 def disturbance_periods(values: Mapping[str, float | bool], game: GameParameters) -> FloatArray:
     """Periods in s of all sinusoids with an amplitude, from the values of the FMU's parameters."""
     entries = [(i, k) for i in range(1, game.players + 1) for k in range(1, game.dimension + 1)]
@@ -106,7 +83,7 @@ def perturbed_run(
     stop_time: float,
     step: float,
     least_window: float = 0.0,
-    progress: Callable[[float], None] | None = None,
+    progress: Progress | None = None,
 ) -> PerturbedRun | Ended:
     """Run from 0 to stop_time with this width of the boundary layer, sampled every step, times in s.
 
@@ -116,15 +93,8 @@ def perturbed_run(
     recorded = [stem for stem in RECORDED if stem in model.variables or model.indexed(stem)]
     count = len(model.select(recorded))
     step = max(step, stop_time * count / LARGEST_RECORD)
-    reached = 0.0
 
-    def run(stop: float) -> Result:
-        def follow(time: float) -> None:
-            nonlocal reached
-            reached = time
-            if progress is not None:
-                progress(time)
-
+    def run(stop: float, follow: Progress) -> Result:
         return simulator.run(
             start_values={"robust": True, "perturbed": True, "epsilon": epsilon},
             stop_time=stop,
@@ -134,14 +104,9 @@ def perturbed_run(
             progress=follow,
         )
 
-    try:
-        result = run(stop_time)
-    except SimulationError as error:
-        x_star = nash_equilibrium(game)
-        start = float(np.abs(game.x0 - x_star).max())
-        size = max(start, float(np.abs(x_star).max()), 1.0)
-        last = run(reached).largest_error(reached, reached) if reached > 0.0 else start
-        return Ended(reached, start, last, size, str(error))
+    result = run_or_end(run, game, stop_time, progress)
+    if isinstance(result, Ended):
+        return result
     return _measured(result, game, window_of(stop_time, least_window))
 
 

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from ..model import Value
 from ..parameters import GameParameters
 from ..run import Simulator
-from .perturbed_run import Ended, PerturbedRun, disturbance_periods, perturbed_run, sample_step
+from .early_end import Ended
+from .perturbed_run import PerturbedRun, disturbance_periods, perturbed_run, sample_step
 from .seeking_error import layer_slope
 from .settling import AGREEMENT, SHORTEST, Maxima, horizons, least_window
 from .verdict import Claim, Verdict

@@ -11,12 +11,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import SimulationError
 from ..model import Model
 from ..parameters import GameParameters
 from ..results import Result
-from ..run import Simulator
+from ..run import Progress, Simulator
 from ..spectrum import consensus_rate, linear_loop, monotonicity_constant, predicted_deviation
+from .early_end import Ended, run_or_end
 from .settling import window_maxima, window_of
 from .verdict import Claim, Verdict
 
@@ -94,22 +94,28 @@ def unperturbed_loop_stable(game: GameParameters, spectrum: Spectrum) -> Claim:
 
 def unperturbed_run(
     simulator: Simulator,
+    game: GameParameters,
     spectrum: Spectrum,
     *,
     progress: Callable[[str, float], None] | None = None,
-) -> Result | SimulationError:
+) -> Result | Ended:
     """Run long enough to see everything decay, or grow; every sample of predicted_deviation's."""
-    stop = _stop_time(simulator.model, spectrum)
-    try:
+    stop_time = _stop_time(simulator.model, spectrum)
+
+    def run(stop: float, follow: Progress) -> Result:
         return simulator.run(
             start_values={"robust": False, "perturbed": False},
             stop_time=stop,
-            step=stop / INTERVALS,
+            step=stop_time / INTERVALS,
             tolerance=TOLERANCE,
-            progress=None if progress is None else lambda time: progress("unperturbed", time / stop),
+            progress=follow,
         )
-    except SimulationError as error:
-        return error
+
+    def report(time: float) -> None:
+        if progress is not None:
+            progress("unperturbed", time / stop_time)
+
+    return run_or_end(run, game, stop_time, report)
 
 
 def _stop_time(model: Model, spectrum: Spectrum) -> float:
@@ -118,9 +124,7 @@ def _stop_time(model: Model, spectrum: Spectrum) -> float:
     return DECAY / spectrum.slowest_rate if spectrum.slowest_rate > 0.0 else model.stop_time
 
 
-def unperturbed_actions_converge(
-    game: GameParameters, spectrum: Spectrum, run: Result | SimulationError
-) -> Claim:
+def unperturbed_actions_converge(game: GameParameters, spectrum: Spectrum, run: Result | Ended) -> Claim:
     """The run follows the exact solution down to x*, neither slower nor faster."""
 
     def claim(verdict: Verdict, reason: str, **figures: float) -> Claim:
@@ -129,8 +133,8 @@ def unperturbed_actions_converge(
 
     if spectrum.unstable:
         return claim(Verdict.FAILS, f"The loop is unstable: a mode grows at {spectrum.abscissa:.4g} 1/s.")
-    if isinstance(run, SimulationError):
-        return claim(Verdict.NOT_SETTLED, f"The run ended early: {run}")
+    if isinstance(run, Ended):
+        return claim(Verdict.FAILS if run.escaped else Verdict.NOT_SETTLED, str(run))
     if spectrum.abscissa is None:
         return claim(*_seen(run))
     if spectrum.marginal:
