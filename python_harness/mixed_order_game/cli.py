@@ -300,6 +300,7 @@ def plot(
 
     mog plot result.parquet --width page
     """
+    from .claims.tolerances import PLAIN_TOLERANCE, TOLERANCE
     from .plot import (
         COLUMN_WIDTH,
         PAGE_WIDTH,
@@ -310,7 +311,6 @@ def plot(
     )
     from .results import load
     from .run import Simulator
-    from .validate import PLAIN_TOLERANCE, TOLERANCE
     from .writing import FIGURE, RESULT
 
     inches = PAGE_WIDTH if width is FigureWidth.PAGE else COLUMN_WIDTH

@@ -14,8 +14,9 @@ from .claims.early_end import Ended, run_or_end
 from .claims.equilibrium import nash_equilibrium_exists
 from .claims.explanation import explain
 from .claims.neighbourhood import within_neighbourhood
-from .claims.perturbed_run import TOLERANCE, PerturbedRun
+from .claims.perturbed_run import PerturbedRun
 from .claims.practical_convergence import Observed, nothing_to_observe, observe, practical_convergence
+from .claims.tolerances import TOLERANCE
 from .claims.unperturbed_loop import (
     spectrum_of,
     unperturbed_actions_converge,

@@ -13,11 +13,9 @@ from ..spectrum import gradient_map
 from ..unknown_term import unknown_term
 from .early_end import Ended, run_or_end
 from .settling import WINDOWS, Maxima, window_maxima, window_of
+from .tolerances import TOLERANCE
 
 FloatArray = NDArray[np.float64]
-
-TOLERANCE = 1e-8
-"""Relative tolerance of the integrator; the absolute one is a hundredth of it."""
 
 RESOLVED = 10.0
 """Errors of this many tolerances are above those of the integrator."""

@@ -18,12 +18,10 @@ from ..run import Progress, Simulator
 from ..spectrum import consensus_rate, linear_loop, monotonicity_constant, predicted_deviation
 from .early_end import Ended, run_or_end
 from .settling import window_maxima, window_of
+from .tolerances import PLAIN_TOLERANCE
 from .verdict import Claim, Verdict
 
 FloatArray = NDArray[np.float64]
-
-TOLERANCE = 1e-10
-"""Relative tolerance of the unperturbed run; the absolute one is a hundredth of it."""
 
 LARGEST_LINEAR_LOOP = 30
 """Most players for which the dense linear loop (2 N + N^2 states) is set up."""
@@ -107,7 +105,7 @@ def unperturbed_run(
             start_values={"robust": False, "perturbed": False},
             stop_time=stop,
             step=stop_time / INTERVALS,
-            tolerance=TOLERANCE,
+            tolerance=PLAIN_TOLERANCE,
             progress=follow,
         )
 
@@ -161,7 +159,7 @@ def largest_disagreement(
     resolve of actions of this size (T, N, D).
     """
     still = np.maximum.accumulate(np.abs(exact).max(axis=(1, 2))[::-1])[::-1]
-    allowed = AGREEMENT * still + RESOLVED * TOLERANCE * (size.max() + 0.01)
+    allowed = AGREEMENT * still + RESOLVED * PLAIN_TOLERANCE * (size.max() + 0.01)
     ratio = np.abs(seen - exact).max(axis=(1, 2)) / allowed
     k = int(np.argmax(ratio))
     return float(ratio[k]), float(times[k]), float(np.abs(seen[k]).max()), float(np.abs(exact[k]).max())
@@ -170,7 +168,7 @@ def largest_disagreement(
 def _seen(run: Result) -> tuple[Verdict, str]:
     """Of a loop that is too large for its exact solution."""
     error = np.abs(run.x - run.x_star).max(axis=(1, 2))
-    floor = RESOLVED * TOLERANCE * (float(np.abs(run.x).max()) + 0.01)
+    floor = RESOLVED * PLAIN_TOLERANCE * (float(np.abs(run.x).max()) + 0.01)
     last = window_maxima(run.time, error, window_of(float(run.time[-1]), 0.0), floor)
     if last.grow:
         return Verdict.FAILS, f"The largest |x - x*| grows from window to window: {last}."

@@ -7,9 +7,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..claims.perturbed_run import TOLERANCE
+from ..claims.tolerances import PLAIN_TOLERANCE, TOLERANCE
 from ..claims.unperturbed_loop import LARGEST_LINEAR_LOOP
-from ..claims.unperturbed_loop import TOLERANCE as PLAIN_TOLERANCE
 from ..errors import ResultError
 from ..model import Model, Value
 from ..names import parse_name
