@@ -148,20 +148,20 @@ def _judge(models: Sequence["Model"], values: Sequence[Mapping[str, "Value"]]) -
 
 def _print(found: "Comparison") -> None:
     from rich.box import SIMPLE_HEAD
-    from rich.console import Console
-    from rich.table import Column, Table
+    from rich.table import Table
     from rich.text import Text
 
     from .metrics import METRIC_UNITS
+    from .printing import show, standard_output
 
-    console = Console(highlight=False)
-    table = Table(Column("run", no_wrap=True), box=SIMPLE_HEAD, padding=(0, 1, 0, 0))
+    console = standard_output()
+    table = Table("run", box=SIMPLE_HEAD, padding=(0, 1, 0, 0))
     for name, unit in METRIC_UNITS.items():
-        table.add_column(name.replace("_", " ") + (f" ({unit})" if unit else ""), min_width=9)
+        table.add_column(name.replace("_", " ") + (f" ({unit})" if unit else ""))
     for run in found.runs:
         figures = [None if run.metrics is None else getattr(run.metrics, name) for name in METRIC_UNITS]
         table.add_row(Text(run.label), *("-" if value is None else f"{value:.3g}" for value in figures))
-    console.print(table)
+    show(table, console)
     for run in found.runs:
         if run.error:
             console.print(Text(f"{run.label}: {run.error}"))

@@ -256,13 +256,13 @@ def _data(result: "SweepResult", missed: list[int], neighbourhood: float | None)
 def _print(result: "SweepResult", definition: "Sweep") -> None:
     import numpy as np
     from rich.box import SIMPLE_HEAD
-    from rich.console import Console
     from rich.table import Table
     from rich.text import Text
 
     from .metrics import METRIC_UNITS
+    from .printing import show, standard_output
 
-    console = Console(highlight=False)
+    console = standard_output()
     console.print(Text(f"{definition.model.title}: {len(result)} runs in {result.folder}", style="bold"))
     table = Table("figure", "least", "median", "most", "in row", box=SIMPLE_HEAD)
     for each in result.summary():
@@ -270,14 +270,14 @@ def _print(result: "SweepResult", definition: "Sweep") -> None:
         numbers = (f"{value:.4g}" for value in (each.least, each.median, each.most))
         name = each.name.replace("_", " ") + (f" ({unit})" if unit else "")
         table.add_row(name, *numbers, str(each.row_of_most) if each.count else "-")
-    console.print(table)
+    show(table, console)
     for name in (*definition.varied, *(("graph_edges",) if definition.graphs else ())):
         if 1 < len(np.unique(result[name])) <= MOST_LEVELS:
             table = Table(name, "median settling time (s)", "median final error", box=SIMPLE_HEAD)
             settling, final = (result.medians([name], figure) for figure in ("settling_time", "final_error"))
             for level in settling:
                 table.add_row(f"{level[0]:.5g}", f"{settling[level]:.4g}", f"{final[level]:.4g}")
-            console.print(table)
+            show(table, console)
     if len(result.failed):
         reasons = result.table["status"].to_pylist()
         first = next(reason for reason in reasons if reason != "ok")

@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 from rich.box import SIMPLE_HEAD as LINES
-from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
 from .errors import ResultError
 from .model import Model, provenance
+from .printing import show, standard_output
 from .results import Result
 from .validate import Validation, Verdict
 
@@ -21,7 +21,7 @@ LONGEST_LIST = 20
 
 def print_info(model: Model, *, variables: bool = False) -> None:
     """Print what an FMU says about itself."""
-    console = Console(highlight=False)
+    console = standard_output()
     data = info_data(model, variables=variables)
     grid = Table.grid(padding=(0, 2))
     for key in ("title", "fmu", "guid", "generation_tool", "players", "dimension", "neurons"):
@@ -33,20 +33,20 @@ def print_info(model: Model, *, variables: bool = False) -> None:
     grid.add_row("experiment", f"{model.stop_time:g} s, step {model.step:g} s, tolerance {model.tolerance:g}")
     counts = ", ".join(f"{count} {kind}" for kind, count in data["variable_counts"].items())
     grid.add_row("variables", counts)
-    console.print(grid)
+    show(grid, console)
 
     sources = provenance(model)
     if sources:
         table = Table("values", "variables", "source", box=LINES)
         for source in sources:
             table.add_row(source.group, ", ".join(source.names), source.source)
-        console.print(table)
+        show(table, console)
 
     kinds = list(model.capabilities)
     table = Table("capability", *kinds, box=LINES)
     for name in dict.fromkeys(name for kind in kinds for name in model.capabilities[kind]):
         table.add_row(name, *(_plain(model.capabilities[kind].get(name, "-")) for kind in kinds))
-    console.print(table)
+    show(table, console)
 
     if variables:
         table = Table("variable", "causality", "variability", "start", "range", "unit", "meaning", box=LINES)
@@ -58,7 +58,7 @@ def print_info(model: Model, *, variables: bool = False) -> None:
             )
             cells = (entry.name, entry.causality, entry.variability, start, limits, entry.unit or "")
             table.add_row(*map(Text, cells), Text(entry.description))
-        console.print(table)
+        show(table, console)
 
 
 def info_data(model: Model, *, variables: bool = False) -> dict[str, Any]:
@@ -94,7 +94,7 @@ def info_data(model: Model, *, variables: bool = False) -> dict[str, Any]:
 
 def print_result(result: Result) -> None:
     """Print where a run ended: each player's action, velocity and distance to the equilibrium."""
-    console = Console(highlight=False)
+    console = standard_output()
     console.print(Text(repr(result)))
     try:
         x, v, x_star = result.x[-1], result.v[-1], result.x_star
@@ -105,7 +105,7 @@ def print_result(result: Result) -> None:
         velocity = "" if np.isnan(v[i]).all() else _numbers(v[i])
         distance = float(np.linalg.norm(x[i] - x_star[i]))
         table.add_row(str(i + 1), _numbers(x[i]), velocity, _numbers(x_star[i]), f"{distance:.2e}")
-    console.print(table)
+    show(table, console)
 
 
 VERDICT_STYLES = {
@@ -118,9 +118,9 @@ VERDICT_STYLES = {
 
 def print_validation(validation: Validation) -> None:
     """Print every claim with its verdict and the reason."""
-    console = Console(highlight=False)
+    console = standard_output()
     console.print(Text(validation.model.title, style="bold"))
-    console.print(claims_table(validation))
+    show(claims_table(validation), console)
     for note in validation.notes:
         console.print(Text(note))
     console.print(Text(validation.summary() + "."))

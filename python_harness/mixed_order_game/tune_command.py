@@ -114,13 +114,13 @@ def tune(
 
 def _print(found: "Tuned") -> None:
     from rich.box import SIMPLE_HEAD
-    from rich.console import Console
     from rich.table import Table
     from rich.text import Text
 
     from .metrics import METRIC_UNITS
+    from .printing import show, standard_output
 
-    console = Console(highlight=False)
+    console = standard_output()
     table = Table("", "before", "tuned", box=SIMPLE_HEAD)
     for name, value in found.gains.items():
         table.add_row(name, f"{found.start_gains[name]:.4g}", f"{value:.4g}")
@@ -128,7 +128,7 @@ def _print(found: "Tuned") -> None:
     for name, unit in METRIC_UNITS.items():
         cells = ("-" if each is None else f"{getattr(each, name):.4g}" for each in (before, after))
         table.add_row(name.replace("_", " ") + (f" ({unit})" if unit else ""), *cells)
-    console.print(table)
+    show(table, console)
     count = len(found.graphs)
     where = (
         "on its graph"

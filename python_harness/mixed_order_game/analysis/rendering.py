@@ -6,13 +6,14 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from ..printing import show, standard_output
 from .findings import Analysis, Figure
 from .hypotheses import Hypothesis
 
 
 def print_analysis(analysis: Analysis, console: Console | None = None, *, tables: bool = False) -> None:
     """Print the verdicts of an analysis, and the tables if wished, on stdout or the console given."""
-    console = Console(highlight=False) if console is None else console
+    console = console or standard_output()
     console.print(Text(analysis.title, style="bold"))
     for verdict in analysis.verdicts:
         console.print(Text(f"- {verdict}"))
@@ -24,10 +25,10 @@ def print_analysis(analysis: Analysis, console: Console | None = None, *, tables
             if row.section == section:
                 unit = "" if row.unit == "1" else row.unit
                 table.add_row(Text(row.name), Text(_plain(row.value)), unit, Text(row.meaning))
-        console.print(table)
-    console.print(_hypotheses("Theorem 1 for the given gains", analysis.hypotheses))
+        show(table, console)
+    show(_hypotheses("Theorem 1 for the given gains", analysis.hypotheses), console)
     for each in analysis.demonstrations:
-        console.print(_hypotheses(f"Theorem 1 for the design by {each.name}", each.hypotheses))
+        show(_hypotheses(f"Theorem 1 for the design by {each.name}", each.hypotheses), console)
 
 
 def _hypotheses(title: str, hypotheses: Sequence[Hypothesis]) -> Table:
