@@ -2,6 +2,7 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 #include <limits>
 #include <numeric>
@@ -47,6 +48,49 @@ Eigen::MatrixXd block_of(const std::vector<int>& group, const SparseRows& patter
     }
   }
   return block;
+}
+
+// Exponents of powers of two that multiply rows and columns so that the magnitudes in each add up to about 1.
+struct Balance {
+  std::vector<int> row;
+  std::vector<int> column;
+};
+
+// Sinkhorn and Knopp: what they reach does not depend on how rows and columns were scaled before, which can hide a
+// regular matrix or a singular one. The largest magnitude of each row comes first, against overflow.
+Balance balance_of(const Eigen::MatrixXd& matrix) {
+  constexpr int most_sweeps = 100;
+  constexpr Real close = 0.1;
+  const auto size = matrix.rows();
+  Eigen::ArrayXXd magnitude = matrix.array().abs();
+  Eigen::ArrayXd row = Eigen::ArrayXd::Zero(size);  // exponents, not yet rounded
+  Eigen::ArrayXd column = Eigen::ArrayXd::Zero(size);
+  const auto usable = [](Real sum) { return sum > 0.0 && std::isfinite(sum); };
+  for (Eigen::Index k = 0; k < size; ++k) {
+    const Real largest = magnitude.row(k).maxCoeff();
+    if (!usable(largest)) continue;
+    row(k) = -std::ilogb(largest);
+    for (Real& entry : magnitude.row(k)) entry = std::ldexp(entry, static_cast<int>(row(k)));
+  }
+  for (int sweep = 0; sweep < most_sweeps; ++sweep) {
+    const Eigen::ArrayXd row_sum = magnitude.rowwise().sum();
+    if (sweep > 0 && (row_sum - 1.0).abs().maxCoeff() <= close) break;
+    for (Eigen::Index k = 0; k < size; ++k) {
+      if (!usable(row_sum(k))) continue;
+      magnitude.row(k) /= row_sum(k);
+      row(k) -= std::log2(row_sum(k));
+    }
+    for (Eigen::Index k = 0; k < size; ++k) {
+      const Real sum = magnitude.col(k).sum();
+      if (!usable(sum)) continue;
+      magnitude.col(k) /= sum;
+      column(k) -= std::log2(sum);
+    }
+  }
+  Balance balance;
+  for (const Real exponent : row) balance.row.push_back(static_cast<int>(std::lround(exponent)));
+  for (const Real exponent : column) balance.column.push_back(static_cast<int>(std::lround(exponent)));
+  return balance;
 }
 
 bool is_regular(const Eigen::PartialPivLU<Eigen::MatrixXd>& lu) {
@@ -139,13 +183,22 @@ void solve_in_place(const SparseRows& pattern, const std::vector<Real>& hessian,
         }
       }
     }
+    const Balance balance = balance_of(block);
+    for (Eigen::Index row = 0; row < size; ++row) {
+      for (Eigen::Index column = 0; column < size; ++column) {
+        block(row, column) = std::ldexp(block(row, column), balance.row[at(row)] + balance.column[at(column)]);
+      }
+      solution(row) = std::ldexp(solution(row), balance.row[at(row)]);
+    }
     const Eigen::PartialPivLU<Eigen::MatrixXd> lu(block);
     if (!is_regular(lu)) {
       throw GameError(
           "the game has no unique Nash equilibrium: the Jacobian of its pseudo-gradient is singular"
-          " (reciprocal condition number below 1e-13), expected cost parameters that make it regular");
+          " (reciprocal condition number below 1e-13 with its rows and columns balanced), expected cost parameters that"
+          " make it regular");
     }
     solution = lu.solve(solution);
+    for (Eigen::Index row = 0; row < size; ++row) solution(row) = std::ldexp(solution(row), balance.column[at(row)]);
     for (Eigen::Index row = 0; row < size; ++row) b[at(group[at(row)])] = solution(row);
   }
 }
@@ -154,6 +207,52 @@ Real largest_magnitude(const std::vector<Real>& numbers) {
   Real largest = 0.0;
   for (const Real number : numbers) largest = std::max(largest, std::abs(number));
   return largest;
+}
+
+/// Whether gradients at x are what rounding leaves of their terms, for costs that are quadratic between 0 and x.
+bool vanish(const std::vector<Real>& gradient, const SparseRows& pattern, const std::vector<Real>& hessian,
+            const std::vector<Real>& x) {
+  constexpr Real rounding = 4.0 * std::numeric_limits<Real>::epsilon();
+  for (std::size_t row = 0; row < gradient.size(); ++row) {
+    Real terms = 0.0;
+    for (int k = pattern.start[row]; k < pattern.start[row + 1]; ++k) {
+      terms += std::abs(hessian[at(k)] * x[at(pattern.column[at(k)])]);
+    }
+    const int entries = pattern.start[row + 1] - pattern.start[row];
+    if (!std::isfinite(terms) || !(std::abs(gradient[row]) <= rounding * (4 + entries) * terms)) return false;
+  }
+  return true;
+}
+
+std::string text_of(Real value) {
+  char text[32];
+  return {text, std::to_chars(text, text + sizeof text, value).ptr};
+}
+
+/// Throws where a player could lower its cost: its own Hessian at x has an eigenvalue that is negative beyond rounding.
+void require_best_responses(const SparseRows& pattern, const std::vector<Real>& hessian, const Shape& shape) {
+  constexpr Real rounding = 1e-12;  // of the largest second derivative of the player's cost
+  for (int i = 0; i < shape.players; ++i) {
+    Eigen::MatrixXd own = Eigen::MatrixXd::Zero(shape.dimension, shape.dimension);
+    Real scale = 0.0;
+    for (int l = 0; l < shape.dimension; ++l) {
+      const auto row = at(shape.entry(i, l));
+      for (int k = pattern.start[row]; k < pattern.start[row + 1]; ++k) {
+        const int column = pattern.column[at(k)];
+        scale = std::max(scale, std::abs(hessian[at(k)]));
+        if (shape.player_of(column) == i) own(l, shape.coordinate_of(column)) += hessian[at(k)];
+      }
+    }
+    const Real smallest =
+        own.isDiagonal(0.0)
+            ? own.diagonal().minCoeff()
+            : Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(own, Eigen::EigenvaluesOnly).eigenvalues()(0);
+    if (smallest >= -rounding * scale) continue;
+    const std::string number = std::to_string(i + 1);
+    throw GameError("player[" + number + "].cost is concave in the player's own action (second derivative " +
+                    text_of(smallest) + "), expected one of at least 0: where all gradients vanish, player " + number +
+                    " can lower its cost, and that is no Nash equilibrium");
+  }
 }
 
 }  // namespace
@@ -165,15 +264,21 @@ std::vector<Real> nash_equilibrium(const Cost& cost, const Shape& shape) {
   std::vector<Real> hessian(at(pattern.entries()));
   std::vector<Real> step(n);
   std::vector<Real> x(n, 0.0);
-  for (int iteration = 0; iteration < most_iterations; ++iteration) {
+  bool converged = false;
+  for (int iteration = 0; iteration < most_iterations && !converged; ++iteration) {
     cost.own_gradients(x.data(), 0, step.data());
     cost.hessian_rows(x.data(), 0, hessian.data());
+    converged = vanish(step, pattern, hessian, x);
     solve_in_place(pattern, hessian, step);
     for (std::size_t p = 0; p < n; ++p) x[p] -= step[p];
-    if (largest_magnitude(step) <= 1e-14 * (1.0 + largest_magnitude(x))) return x;
+    converged = converged || largest_magnitude(step) <= 1e-14 * (1.0 + largest_magnitude(x));
   }
-  const bool finite = std::all_of(x.begin(), x.end(), [](Real entry) { return std::isfinite(entry); });
-  if (!finite) throw GameError("the search for the Nash equilibrium did not converge, expected costs with one");
+  if (!converged || !std::all_of(x.begin(), x.end(), [](Real entry) { return std::isfinite(entry); })) {
+    throw GameError("the search for the Nash equilibrium did not converge in " + std::to_string(most_iterations) +
+                    " Newton steps, expected costs with one");
+  }
+  cost.hessian_rows(x.data(), 0, hessian.data());
+  require_best_responses(pattern, hessian, shape);
   return x;
 }
 

@@ -15,9 +15,18 @@ with n = 2 N + N^2, states of several coordinates are columns. Entry N + i is z_
 import numpy as np
 from numpy.typing import NDArray
 
+from .errors import GameError
 from .parameters import GameParameters
 
 FloatArray = NDArray[np.float64]
+
+ROUNDING = 1e-12
+"""Part of a player's largest second derivative below which a negative one is taken for rounding."""
+
+SINGULAR = 1e-13
+"""Reciprocal condition number, of balanced rows and columns, below which a matrix counts as singular."""
+
+SWEEPS, BALANCED = 100, 0.1
 
 
 def gradient_map(game: GameParameters) -> FloatArray:
@@ -33,8 +42,45 @@ def monotonicity_constant(game: GameParameters) -> float:
 
 
 def nash_equilibrium(game: GameParameters) -> FloatArray:
-    """x* (N, D) with h x* + l = 0. Raises numpy.linalg.LinAlgError if h is singular."""
-    return np.asarray(np.linalg.solve(gradient_map(game), -game.cost_linear), dtype=np.float64)
+    """x* (N, D) with h x* + l = 0, where no player can lower its cost.
+
+    Raises GameError, as the build of an FMU does, if h is singular whatever the units of its rows and
+    columns, or a player's cost is concave in its own action.
+    """
+    h = gradient_map(game)
+    curvature = np.diag(h)
+    concave = np.flatnonzero(curvature < -ROUNDING * np.abs(h).max(axis=1))
+    if concave.size:
+        i = int(concave[0])
+        raise GameError(
+            f"player[{i + 1}].cost is concave in the player's own action "
+            f"(second derivative {curvature[i]:g}), expected one of at least 0: where all gradients vanish, "
+            f"player {i + 1} can lower its cost, and that is no Nash equilibrium"
+        )
+    row, column = _balance(h)
+    balanced = row[:, np.newaxis] * h * column
+    if not np.linalg.cond(balanced, 1) < 1.0 / SINGULAR:
+        raise GameError("the game has no unique Nash equilibrium: the map of its gradients is singular")
+    x_star = column[:, np.newaxis] * np.linalg.solve(balanced, row[:, np.newaxis] * -game.cost_linear)
+    return np.asarray(x_star, dtype=np.float64)
+
+
+def _balance(matrix: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Factors (N,) of rows and columns that make magnitudes in each add up to about 1 (Sinkhorn, Knopp)."""
+    magnitude = np.abs(matrix)
+    row, column = np.ones(len(matrix)), np.ones(len(matrix))
+    for _ in range(SWEEPS):
+        factor = _inverse(magnitude.sum(axis=1))
+        row, magnitude = row * factor, magnitude * factor[:, np.newaxis]
+        factor = _inverse(magnitude.sum(axis=0))
+        column, magnitude = column * factor, magnitude * factor
+        if np.abs(magnitude.sum(axis=1) - 1.0).max() <= BALANCED:
+            break
+    return row, column
+
+
+def _inverse(sums: FloatArray) -> FloatArray:
+    return np.where(sums > 0.0, 1.0 / np.where(sums > 0.0, sums, 1.0), 1.0)
 
 
 def linear_loop(game: GameParameters) -> FloatArray:

@@ -64,6 +64,162 @@ TEST(NashEquilibrium, IsRefusedWhereItIsNotUnique) {
   EXPECT_NO_THROW(nash_equilibrium(cost, shape));
 }
 
+TEST(NashEquilibrium, IsRefusedWhereAPlayerCouldLowerItsCost) {
+  const Shape shape{.players = 2, .dimension = 1, .neurons = 1, .order = {1, 1}};
+  QuadraticCost cost(2, 1);
+  cost.quadratic = {0.3, 0.3};
+  cost.linear = {1.0, 0.0};
+  cost.coupling = {0.0, 2.0, -2.0, 0.0};
+  cost.refresh();
+  try {
+    nash_equilibrium(cost, shape);
+    FAIL() << "player 2's cost is concave in x_2";
+  } catch (const GameError& error) {
+    EXPECT_EQ(std::string(error.what()).find("player[2].cost is concave"), 0U) << error.what();
+  }
+  // f_1 = -2 x_1 x_2 + x_2^2 and f_2 = 2 x_1 x_2 - x_1^2, linear in the own action, have an equilibrium at 0
+  cost.quadratic = {-1.0, 1.0};
+  cost.linear = {0.0, 0.0};
+  cost.coupling = {0.0, 1.0, -1.0, 0.0};
+  cost.refresh();
+  EXPECT_EQ(nash_equilibrium(cost, shape), std::vector<Real>(2, 0.0));
+  // 0.1 + 0.2 - 0.3 is no curvature, and neither is its rounding error in either direction
+  for (const Real sign : {1.0, -1.0}) {
+    const Shape three{.players = 3, .dimension = 1, .neurons = 1, .order = {1, 1, 1}};
+    QuadraticCost flat(3, 1);
+    flat.quadratic = {-0.3 * sign, 1.0, 1.0};
+    flat.coupling = {0.0, 0.1 * sign, 0.2 * sign, -0.2 * sign, 0.0, 0.0, -0.2 * sign, 0.0, 0.0};
+    flat.refresh();
+    EXPECT_NO_THROW(nash_equilibrium(flat, three));
+  }
+  // however small the costs are
+  cost.quadratic = {1.0, -1e-9};
+  cost.coupling = {0.0, 1.0, 0.0, 0.0};
+  cost.refresh();
+  EXPECT_THROW(nash_equilibrium(cost, shape), GameError);
+}
+
+TEST(NashEquilibrium, OfRowsOfDifferentSizeIsThatOfEqualOnes) {
+  const Shape shape{.players = 2, .dimension = 1, .neurons = 1, .order = {1, 1}};
+  QuadraticCost cost(2, 1);
+  cost.quadratic = cost.linear = {1e-7, 1e7};
+  cost.coupling = {0.0, 1e-7, 1e7, 0.0};
+  cost.refresh();
+  for (const Real x : nash_equilibrium(cost, shape)) EXPECT_NEAR(x, -0.5, 1e-15);
+}
+
+/// Players on a line whose gradients are J x + l, for any J.
+class AffineGradients final : public Cost {
+ public:
+  explicit AffineGradients(int players) : players_(players) {
+    for (int i = 0; i < players; ++i) {
+      for (int j = 0; j < players; ++j) pattern_.column.push_back(j);
+      pattern_.start.push_back(pattern_.entries());
+    }
+  }
+  std::vector<Real> jacobian;
+  std::vector<Real> linear;
+
+  [[nodiscard]] std::unique_ptr<Cost> clone() const override { return std::make_unique<AffineGradients>(*this); }
+  [[nodiscard]] Real value(int /*i*/, const Real* /*x*/) const override { return 0.0; }
+  void own_gradients(const Real* points, int stride, Real* gradient) const override {
+    for (int i = 0; i < players_; ++i) {
+      gradient[i] = linear[at(i)];
+      for (int j = 0; j < players_; ++j) gradient[i] += jacobian[at(i * players_ + j)] * points[i * stride + j];
+    }
+  }
+  [[nodiscard]] const SparseRows& hessian_pattern() const override { return pattern_; }
+  void hessian_rows(const Real* /*points*/, int /*stride*/, Real* values) const override {
+    std::copy(jacobian.begin(), jacobian.end(), values);
+  }
+  [[nodiscard]] std::unique_ptr<Cost> zero_direction() const override { return clone(); }
+  void own_gradients_along(const Cost& /*direction*/, const Real* /*points*/, int /*stride*/,
+                           Real* /*derivative*/) const override {}
+  void refresh() override {}
+
+ private:
+  int players_;
+  SparseRows pattern_;
+};
+
+// J = D_1 A D_2 and l = -D_1 A (1, 1, 1)': x* = D_2^-1 (1, 1, 1)' however D_1 and D_2 are chosen
+TEST(NashEquilibrium, IsJudgedWhateverTheUnitsOfRowsAndColumns) {
+  const Shape shape{.players = 3, .dimension = 1, .neurons = 1, .order = {1, 1, 1}};
+  const std::vector<Real> regular[] = {{2.0, -1.0, 0.5, 0.3, 1.5, -0.7, 1.0, 0.2, 3.0},
+                                       {1.0, 1.0, 0.0, 0.0, 1.0, 1.0, 1.0, 0.0, 1.0},
+                                       {0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 1.0, 0.0, 0.0}};
+  const std::vector<Real> singular = {2.0, -1.0, 1.0, -1.0, 2.0, 1.0, 1.0, 1.0, 2.0};
+  testing::RandomNumbers random(3);
+  std::vector<Real> exponent(6);
+  AffineGradients cost(3);
+  for (int repeat = 0; repeat < 20; ++repeat) {
+    random.fill(exponent, -14.0, 14.0);
+    const auto scaled = [&](const std::vector<Real>& A) {
+      cost.jacobian = A;
+      cost.linear.assign(3, 0.0);
+      for (int i = 0; i < 3; ++i) {
+        for (int j = 0; j < 3; ++j) {
+          cost.jacobian[at(3 * i + j)] *= std::pow(10.0, exponent[at(i)] + exponent[at(3 + j)]);
+          cost.linear[at(i)] -= A[at(3 * i + j)] * std::pow(10.0, exponent[at(i)]);
+        }
+      }
+    };
+    for (const std::vector<Real>& A : regular) {
+      scaled(A);
+      const std::vector<Real> x_star = nash_equilibrium(cost, shape);
+      for (int j = 0; j < 3; ++j) EXPECT_NEAR(x_star[at(j)] * std::pow(10.0, exponent[at(3 + j)]), 1.0, 1e-12);
+    }
+    scaled(singular);
+    EXPECT_THROW(nash_equilibrium(cost, shape), GameError);
+  }
+}
+
+/// f_1' = x_1^3 - 2 x_1 + 2, at which Newton's method from 0 goes to 1 and back for ever, and f_2' = x_2.
+class CyclingCost final : public Cost {
+ public:
+  [[nodiscard]] std::unique_ptr<Cost> clone() const override { return std::make_unique<CyclingCost>(*this); }
+  [[nodiscard]] Real value(int /*i*/, const Real* /*x*/) const override { return 0.0; }
+  void own_gradients(const Real* points, int stride, Real* gradient) const override {
+    gradient[0] = points[0] * points[0] * points[0] - 2.0 * points[0] + 2.0;
+    gradient[1] = points[stride + 1];
+  }
+  [[nodiscard]] const SparseRows& hessian_pattern() const override { return pattern_; }
+  void hessian_rows(const Real* points, int /*stride*/, Real* values) const override {
+    values[0] = 3.0 * points[0] * points[0] - 2.0;
+    values[1] = 1.0;
+  }
+  [[nodiscard]] std::unique_ptr<Cost> zero_direction() const override { return clone(); }
+  void own_gradients_along(const Cost& /*direction*/, const Real* /*points*/, int /*stride*/,
+                           Real* /*derivative*/) const override {}
+  void refresh() override {}
+
+ private:
+  SparseRows pattern_{.start = {0, 1, 2}, .column = {0, 1}};
+};
+
+TEST(NashEquilibrium, IsRefusedWhereTheStepsDoNotConverge) {
+  const Shape shape{.players = 2, .dimension = 1, .neurons = 1, .order = {1, 1}};
+  try {
+    nash_equilibrium(CyclingCost(), shape);
+    FAIL() << "it does not converge";
+  } catch (const GameError& error) {
+    EXPECT_NE(std::string(error.what()).find("did not converge in 50 Newton steps"), std::string::npos) << error.what();
+  }
+}
+
+// f_1 and f_2 nearly only wish to meet: x* is right to what the rounding of its coefficients leaves
+TEST(NashEquilibrium, ThatIsIllConditionedConverges) {
+  const Shape shape{.players = 2, .dimension = 1, .neurons = 1, .order = {1, 1}};
+  for (const Real weak : {1e-6, 1e-9, 1e-12}) {
+    QuadraticCost cost(2, 1);
+    cost.quadratic = {weak, 0.0};
+    cost.linear = {-6.0 * weak, 0.0};
+    cost.coupling = {0.0, 0.7, 0.3, 0.0};
+    cost.refresh();
+    for (const Real x : nash_equilibrium(cost, shape)) EXPECT_NEAR(x, 3.0, 1e-15 / weak);
+  }
+}
+
 /// f_1 = exp(x_1 - 1) - x_1 + x_1 x_2 and f_2 = cosh(x_2) - x_1 x_2, which are not quadratic.
 class ExponentialCost final : public Cost {
  public:

@@ -435,7 +435,10 @@ const Refusal relations[] = {
      "player[1].v0 is [0.1, 0.2], expected no v0 for a player of order 1, which has z0"},
     {"cost = { quadratic = 2.0, linear = -4.0 }", "",
      "the game has no unique Nash equilibrium: the Jacobian of its pseudo-gradient is singular (reciprocal condition "
-     "number below 1e-13), expected cost parameters that make it regular"},
+     "number below 1e-13 with its rows and columns balanced), expected cost parameters that make it regular"},
+    {"cost = { quadratic = 2.0, linear = -4.0 }", "cost = { quadratic = -2.0, linear = -4.0 }",
+     "player[2].cost is concave in the player's own action (second derivative -4), expected one of at least 0: where "
+     "all gradients vanish, player 2 can lower its cost, and that is no Nash equilibrium"},
 };
 INSTANTIATE_TEST_SUITE_P(Relations, GameDefinitionRefuses, ::testing::ValuesIn(relations));
 

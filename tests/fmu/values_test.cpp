@@ -1,10 +1,11 @@
 // Reading and setting: behaviours 7 to 11, and 20.
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <pugixml.hpp>
 
+#include "importer.hpp"
 #include "model_description.hpp"
-#include "slave.hpp"
 
 using namespace mixed_order_game;
 
@@ -391,6 +392,31 @@ TEST(Behaviour11SeveralValues, AGameWithoutUniqueEquilibriumIsJudgedWhereItMatte
   EXPECT_EQ(slave.get("time"), 0.2);
   mend_costs();
   EXPECT_EQ(slave.step(0.2, 0.1), fmi2OK) << slave.last_message();
+}
+
+TEST(Behaviour11SeveralValues, ACostThatIsConcaveInTheOwnActionIsJudgedWhereItMatters) {
+  Slave slave;
+  Importer importer;
+  const auto break_and_mend = [](Slave& each, const char* call, const std::function<fmi2Status()>& judged) {
+    SCOPED_TRACE(call);
+    // own curvature of player 2: 1.7 + 0.3 + 0.6 and then -2 + 0.3 + 0.6
+    ASSERT_EQ(each.set("cost_quadratic[2]", -2.0), fmi2OK);
+    EXPECT_EQ(judged(), fmi2Error);
+    EXPECT_TRUE(mentions(each.last_message(), "player[2].cost is concave")) << each.last_message();
+    EXPECT_TRUE(mentions(each.last_message(), "(second derivative -2.2")) << each.last_message();
+    const fmi2ValueReference x_star = each.reference("x_star[1,1]");
+    double value = 7.0;
+    EXPECT_EQ(fmi2GetReal(each.component, &x_star, 1, &value), fmi2Error);
+    EXPECT_EQ(value, 7.0);
+    ASSERT_EQ(each.set("cost_quadratic[2]", 1.7), fmi2OK);
+    EXPECT_EQ(judged(), fmi2OK) << each.last_message();
+  };
+  ASSERT_EQ(fmi2EnterInitializationMode(slave.component), fmi2OK);
+  break_and_mend(slave, "exit of initialization", [&] { return fmi2ExitInitializationMode(slave.component); });
+  break_and_mend(slave, "step", [&] { return slave.step(0.0, 0.1); });
+  ASSERT_EQ(fmi2EnterInitializationMode(importer.component), fmi2OK);
+  ASSERT_EQ(fmi2ExitInitializationMode(importer.component), fmi2OK);
+  break_and_mend(importer, "end of event mode", [&] { return fmi2EnterContinuousTimeMode(importer.component); });
 }
 
 TEST(Behaviour11Overflow, NeverGivesNonFiniteOutputs) {

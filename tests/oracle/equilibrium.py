@@ -26,7 +26,10 @@ def pseudo_gradient_jacobian(game: Game, x: FloatArray) -> FloatArray:
 
 
 def nash_equilibrium(game: Game) -> FloatArray:
-    """x* with grad_i f_i(x*) = 0 for every player; (N, D). Raises ArithmeticError if no root is found."""
+    """x* with grad_i f_i(x*) = 0 and a convex f_i along x_i for every player; (N, D).
+
+    Raises ArithmeticError if no root is found or a player could lower its cost there.
+    """
     shape = game.x0.shape
 
     def gradient(x: FloatArray) -> FloatArray:
@@ -35,10 +38,22 @@ def nash_equilibrium(game: Game) -> FloatArray:
     def jacobian(x: FloatArray) -> FloatArray:
         return pseudo_gradient_jacobian(game, x.reshape(shape))
 
-    found = root(gradient, np.zeros(game.x0.size), jac=jacobian, tol=1e-14)
+    # each gradient in the unit of its second derivatives: no player's scale hides another's residual
+    unit = np.abs(jacobian(np.zeros(game.x0.size))).max(axis=1)
+    unit[unit == 0.0] = 1.0
+    found = root(
+        lambda x: gradient(x) / unit,
+        np.zeros(game.x0.size),
+        jac=lambda x: jacobian(x) / unit[:, None],
+        tol=1e-14,
+    )
     residual = np.max(np.abs(found.fun))
-    if not residual < 1e-10 * (1.0 + np.max(np.abs(game.cost_linear))):
+    if not residual < 1e-10 * (1.0 + np.max(np.abs(gradient(np.zeros(game.x0.size)) / unit))):
         raise ArithmeticError(f"no Nash equilibrium found: {found.message} (residual {residual})")
+    second = jacobian(found.x).reshape(*shape, *shape)
+    for i in range(game.players):
+        if np.linalg.eigvalsh(second[i, :, i, :])[0] < -1e-12 * np.abs(second[i]).max():
+            raise ArithmeticError(f"player {i + 1} could lower its cost where all gradients vanish")
     return np.asarray(found.x, dtype=np.float64).reshape(shape)
 
 

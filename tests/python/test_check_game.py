@@ -3,16 +3,19 @@
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from typer.testing import CliRunner, Result
 
 from mixed_order_game import GameError, default_game
+from mixed_order_game.analysis import analyse, read_game
 from mixed_order_game.authoring import Recipe, check_game, new_game
 from mixed_order_game.authoring.positions import Positions
 from mixed_order_game.build import build_fmu
 from mixed_order_game.cli import app
+from mixed_order_game.spectrum import nash_equilibrium
 
 MANY = """\
 title = "bad"
@@ -147,6 +150,39 @@ def test_no_unique_equilibrium(tmp_path: Path) -> None:
     flat = re.sub(r"^cost = .*$", "cost = { linear = 1.0 }", text, flags=re.MULTILINE)
     (problem,) = check_game(written(tmp_path, flat))
     assert "no unique Nash equilibrium" in problem.sentence
+
+
+def test_a_cost_that_is_concave_in_the_own_action(tmp_path: Path) -> None:
+    text = new_game(Recipe(2, 1))
+    costs = iter(
+        [
+            "cost = { quadratic = 0.3, coupling = [[2, 2.0]] }",
+            "cost = { quadratic = 0.3, coupling = [[1, -2.0]] }",
+        ]
+    )
+    path = written(tmp_path, re.sub(r"^cost = .*$", lambda _: next(costs), text, flags=re.MULTILINE))
+    (problem,) = check_game(path)
+    told = "player[2].cost is concave in the player's own action (second derivative -3.4"
+    assert problem.sentence.startswith(told)
+    assert path.read_text(encoding="utf-8").splitlines()[problem.line - 1].endswith("[[1, -2.0]] }")
+    with pytest.raises(GameError, match=re.escape(told)):
+        build_fmu(path, tmp_path / "game.fmu")
+    with pytest.raises(GameError, match=re.escape(told)):
+        analyse(path, simulation=False)
+
+
+def test_costs_in_different_units(tmp_path: Path) -> None:
+    text = new_game(Recipe(2, 1))
+    units = iter([1e-7, 1e7])
+
+    def cost(_: re.Match[str]) -> str:
+        unit = next(units)
+        other = 2 if unit < 1.0 else 1
+        return f"cost = {{ quadratic = {unit}, linear = {unit}, coupling = [[{other}, {unit}]] }}"
+
+    path = written(tmp_path, re.sub(r"^cost = .*$", cost, text, flags=re.MULTILINE))
+    assert check_game(path) == ()
+    np.testing.assert_allclose(nash_equilibrium(read_game(path).parameters), -0.5, rtol=1e-14)
 
 
 def test_positions() -> None:

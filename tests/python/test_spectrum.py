@@ -1,11 +1,13 @@
 """The linear loop from the FMU's variables against the paper's Kronecker expressions, and its rates."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from mixed_order_game import read_model, spectrum
+from mixed_order_game import GameError, read_model, spectrum
+from mixed_order_game.analysis.game import read_game as read_game_file
 from mixed_order_game.parameters import game_parameters
 from tests.conftest import GAMES, FmuOf
 from tests.oracle import equilibrium, linear_loop
@@ -38,6 +40,41 @@ def test_matches_the_oracle(name: str, fmu_of: FmuOf) -> None:
     np.testing.assert_allclose(game.dynamics_linear, other.dynamics_linear)
     np.testing.assert_allclose(game.dynamics_square, other.dynamics_square)
     np.testing.assert_allclose(game.y0, other.y0)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_equilibria_of_random_costs_are_judged_as_by_the_oracle(seed: int) -> None:
+    """Rows over ten decades, and one game in two with a cost that is concave in the own action."""
+    random = np.random.default_rng(seed)
+    other = oracle_game("interleaved_orders")
+    N, D = other.players, other.dimension
+    unit = 10.0 ** random.uniform(-5.0, 5.0, N)
+    coupling = random.uniform(-0.3, 1.0, (N, N)) * (1.0 - np.eye(N))
+    quadratic = random.uniform(0.1, 2.0, N) - coupling.sum(axis=1)
+    if seed % 2:
+        quadratic[seed % N] -= 2.5
+    costs = {
+        "cost_quadratic": quadratic * unit,
+        "cost_linear": random.uniform(-1.0, 1.0, (N, D)) * unit[:, np.newaxis],
+        "cost_coupling": coupling * unit[:, np.newaxis],
+    }
+    other = replace(other, **costs)
+    game = replace(read_game_file(GAMES / "interleaved_orders.toml").parameters, **costs)
+    if seed % 2:
+        with pytest.raises(ArithmeticError, match=f"player {seed % N + 1} could lower"):
+            equilibrium.nash_equilibrium(other)
+        with pytest.raises(GameError, match=rf"player\[{seed % N + 1}\].cost is concave"):
+            spectrum.nash_equilibrium(game)
+        return
+    x_star = equilibrium.nash_equilibrium(other)
+    np.testing.assert_allclose(spectrum.nash_equilibrium(game), x_star, rtol=1e-9, atol=1e-9)
+
+
+def test_no_unique_equilibrium_is_refused() -> None:
+    game = read_game_file(GAMES / "interleaved_orders.toml").parameters
+    flat = replace(game, cost_quadratic=np.zeros(game.players), cost_coupling=np.zeros((game.players,) * 2))
+    with pytest.raises(GameError, match="no unique Nash equilibrium"):
+        spectrum.nash_equilibrium(flat)
 
 
 def test_prediction_matches_the_oracle(fmu_of: FmuOf) -> None:

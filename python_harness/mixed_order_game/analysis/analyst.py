@@ -86,8 +86,8 @@ class Analyst:
         self.progress = progress
         try:
             nash_equilibrium(game.parameters)
-        except np.linalg.LinAlgError as error:
-            raise GameError(f"{game.path} has no unique Nash equilibrium") from error
+        except GameError as error:
+            raise GameError(f"{game.path}: {error}") from error
         self.constants = loop_constants(game.parameters)
         self.assumptions = standing_assumptions(game, self.constants)
         self.rows: list[Row] = []

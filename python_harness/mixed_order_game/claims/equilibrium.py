@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from ..errors import GameError
 from ..parameters import GameParameters
 from ..spectrum import monotonicity_constant, nash_equilibrium
 from .verdict import Claim, Verdict
@@ -29,7 +30,7 @@ def _judge(game: GameParameters) -> tuple[Verdict, str]:
         )
     try:
         nash_equilibrium(game)
-    except np.linalg.LinAlgError:
+    except GameError:
         return Verdict.FAILS, "The gradients of all players do not vanish at exactly one point."
     m = monotonicity_constant(game)
     if m > 0.0:
