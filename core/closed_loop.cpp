@@ -11,7 +11,15 @@ ClosedLoop::ClosedLoop(Parameters parameters) : parameters_(std::move(parameters
   refresh();
 }
 
-void ClosedLoop::refresh() { parameters_.refresh(); }
+void ClosedLoop::refresh() {
+  parameters_.disturbance->time_origin = time_origin_;
+  parameters_.refresh();
+}
+
+void ClosedLoop::set_time_origin(Real time_origin) {
+  time_origin_ = parameters_.disturbance->time_origin = time_origin;
+  parameters_.disturbance->refresh();
+}
 
 void ClosedLoop::initial_state(const InitialState& initial, Real* state) const {
   std::copy(initial.x.begin(), initial.x.end(), state + layout_.x());

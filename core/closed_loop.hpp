@@ -19,6 +19,10 @@ class ClosedLoop {
   [[nodiscard]] Parameters& parameters() { return parameters_; }
   void refresh();
 
+  /// The absolute time [s] from which every t below counts. Near it no time loses digits, whatever the date.
+  [[nodiscard]] Real time_origin() const { return time_origin_; }
+  void set_time_origin(Real time_origin);
+
   [[nodiscard]] const Shape& shape() const { return parameters_.shape; }
   [[nodiscard]] const StateLayout& layout() const { return layout_; }
 
@@ -47,7 +51,7 @@ class ClosedLoop {
   /// activations, network and robust term.
   void evaluate_seeking(const Real* state, Signals& signals) const;
 
-  /// All signals and state rates at time t [s]; d_ext[entry(i, l)] is the external disturbance.
+  /// All signals and state rates at time_origin() + t [s]; d_ext[entry(i, l)] is the external disturbance.
   void evaluate(Real t, const Real* state, const Real* d_ext, const Modes& modes, Signals& signals, Real* rate) const;
 
   /// w'w of each weight column, at entry(i, l).
@@ -69,6 +73,7 @@ class ClosedLoop {
  private:
   Parameters parameters_;
   StateLayout layout_;
+  Real time_origin_ = 0.0;
 };
 
 }  // namespace mixed_order_game

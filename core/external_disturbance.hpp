@@ -1,7 +1,7 @@
 // The external disturbance d_ext(t) that comes from outside: for each entry a polynomial in time.
 //
 // Entry p holds  value + sum over k >= 1 of derivative_k (t - t_set)^k / k!, where t_set is the time at which its
-// derivatives were set; setting the value anew removes them.
+// derivatives were set; setting the value anew removes them. Times count from the start of the run.
 #pragma once
 
 #include <span>

@@ -27,9 +27,9 @@ struct FreeCvode {
 };
 using Cvode = std::unique_ptr<void, FreeCvode>;
 
-std::string in_seconds(Real t) {
+std::string in_seconds(Real t, int digits = 9) {
   char text[32];
-  const auto [end, error] = std::to_chars(text, text + sizeof text, t, std::chars_format::general, 9);
+  const auto [end, error] = std::to_chars(text, text + sizeof text, t, std::chars_format::general, digits);
   return std::string(text, end) + " s";
 }
 
@@ -59,6 +59,7 @@ class Integrator::Implementation final : NewtonSystem {
   void interpolate(Real t, Real* state);
   void settle(Real* state);
   [[noreturn]] void fail(int flag, Real t);
+  [[nodiscard]] std::string absolute(Real t) const { return in_seconds(loop_.time_origin() + t, 15); }
 
   // CVODE's callbacks
   int rate(Real t, const Real* state, Real* rate) noexcept override;
@@ -269,7 +270,7 @@ int Integrator::Implementation::solve(Real* b) noexcept {
 void Integrator::Implementation::fail(int flag, Real t) {
   if (failure_) std::rethrow_exception(std::exchange(failure_, nullptr));
   std::unique_ptr<char, decltype(&std::free)> name(CVodeGetReturnFlagName(flag), &std::free);
-  throw IntegrationError("the integration stopped at t = " + in_seconds(t) + ": " +
+  throw IntegrationError("the integration stopped at t = " + absolute(t) + ": " +
                          (message_.empty() ? std::string(name.get()) : message_));
 }
 
@@ -344,7 +345,7 @@ void Integrator::Implementation::take_step() {
   if (flag < 0) fail(flag, before);
   ++steps_since_restart_;
   if (!(internal_time_ > before)) {
-    throw IntegrationError("the integration stopped at t = " + in_seconds(before) +
+    throw IntegrationError("the integration stopped at t = " + absolute(before) +
                            ": the step size fell below the resolution of time");
   }
   std::fill(event_columns_.begin(), event_columns_.end(), 0);
@@ -430,9 +431,9 @@ void Integrator::Implementation::advance(Real t_end) {
       take_step();
       if (++steps < patience) continue;
       if (!(internal_time_ - mark >= least_progress)) {
-        throw IntegrationError("the integration stopped at t = " + in_seconds(internal_time_) + ": " +
+        throw IntegrationError("the integration stopped at t = " + absolute(internal_time_) + ": " +
                                std::to_string(patience) + " steps advanced it by " + in_seconds(internal_time_ - mark) +
-                               ", which is no progress towards " + in_seconds(t_end));
+                               ", which is no progress towards " + absolute(t_end));
       }
       mark = internal_time_;
       steps = 0;

@@ -4,6 +4,9 @@
 // CVODE takes its internal steps one by one and outputs are interpolated, so the sequence of internal steps depends on
 // nothing but the last restart point (time, state, modes, parameters, inputs): communication points leave no trace, and
 // a checkpoint is that restart point plus the count of steps since.
+//
+// All times here are seconds since the loop's time origin: where a run begins there, the resolution of its times does
+// not depend on the date.
 #pragma once
 
 #include <cstdint>

@@ -19,14 +19,17 @@ bool same_bits(std::span<const Real> a, std::span<const Real> b) {
 }  // namespace
 
 CoSimulation::CoSimulation(const Evaluation& evaluation)
-    : integrator_(evaluation.loop(), evaluation.input(), make_newton_solver(evaluation.loop().shape())) {}
+    : loop_(evaluation.loop()), integrator_(loop_, evaluation.input(), make_newton_solver(loop_.shape())) {}
 
-void CoSimulation::start(Real t, Tolerances tolerances, std::vector<Real> acting) {
-  integrator_.start(t, tolerances);
+void CoSimulation::start(Tolerances tolerances, std::vector<Real> acting) {
+  integrator_.start(0.0, tolerances);
+  time_ = loop_.time_origin();
   acting_ = std::move(acting);
 }
 
-Standing CoSimulation::standing() const { return {integrator_.time(), integrator_.state(), &integrator_.modes()}; }
+Standing CoSimulation::standing() const {
+  return {time_, integrator_.time(), integrator_.state(), &integrator_.modes()};
+}
 
 Change CoSimulation::change_to(std::span<const Real> settings, std::size_t parameters) const {
   if (same_bits(settings, acting_)) return Change::none;
@@ -40,7 +43,7 @@ void CoSimulation::settings_act(Change change, std::vector<Real> acting) {
 }
 
 Real CoSimulation::end_of_step(Real t, Real h, std::optional<Real> stop_time) const {
-  const Real now = integrator_.time();
+  const Real now = time_;
   if (!(h > 0.0) || !std::isfinite(h)) {
     throw Error("the step size is " + text_of(h) + ", expected a positive finite number");
   }
@@ -50,15 +53,25 @@ Real CoSimulation::end_of_step(Real t, Real h, std::optional<Real> stop_time) co
   }
   const Real end = std::max(t + h, now);
   if (!std::isfinite(end)) throw Error("the step ends at " + text_of(end) + ", expected a finite time");
-  if (stop_time && end > *stop_time + time_tolerance(end, h)) {
+  if (!(end > now)) {
+    throw Error("the step size is " + text_of(h) + ", expected one that reaches beyond " + text_of(now) +
+                " in double precision");
+  }
+  if (stop_time && end > *stop_time + stop_tolerance(end, h)) {
     throw Error("the step from " + text_of(t) + " by " + text_of(h) + " ends after the stop time " +
                 text_of(*stop_time));
   }
   return end;
 }
 
+void CoSimulation::advance(Real t_end) {
+  integrator_.advance(t_end - loop_.time_origin());
+  time_ = t_end;
+}
+
 bool CoSimulation::restore(const Point& point, Tolerances tolerances) {
   acting_ = point.acting;
+  time_ = point.time;
   return integrator_.restore(point.checkpoint, tolerances);
 }
 

@@ -15,14 +15,15 @@ class CoSimulation {
   /// All that a run consists of besides the settings that the importer made since its last step.
   struct Point {
     std::vector<Real> acting;  ///< settings that act, as ModelVariables::save gives them
+    Real time = 0.0;           ///< of the communication point, absolute
     Checkpoint checkpoint;
   };
 
   /// The evaluation must outlive the run.
   explicit CoSimulation(const Evaluation& evaluation);
 
-  /// Begins at time t with the loop's initial state.
-  void start(Real t, Tolerances tolerances, std::vector<Real> acting);
+  /// Begins at the loop's time origin with its initial state.
+  void start(Tolerances tolerances, std::vector<Real> acting);
   [[nodiscard]] Standing standing() const;
   [[nodiscard]] Statistics statistics() const { return integrator_.statistics(); }
 
@@ -33,14 +34,16 @@ class CoSimulation {
 
   /// Where a step from t by h ends; throws Error when it is none that can be taken.
   [[nodiscard]] Real end_of_step(Real t, Real h, std::optional<Real> stop_time) const;
-  void advance(Real t_end) { integrator_.advance(t_end); }
+  void advance(Real t_end);
 
-  [[nodiscard]] Point save() const { return {acting_, integrator_.checkpoint()}; }
-  /// As Integrator::restore; the evaluation has taken over the settings that act.
+  [[nodiscard]] Point save() const { return {acting_, time_, integrator_.checkpoint()}; }
+  /// As Integrator::restore; the evaluation has taken over the settings that act and the start time.
   bool restore(const Point& point, Tolerances tolerances);
 
  private:
+  const ClosedLoop& loop_;
   Integrator integrator_;
+  Real time_ = 0.0;
   std::vector<Real> acting_;
 };
 

@@ -23,11 +23,11 @@ Tangent DirectionalDerivative::along(const Changes& changes, Equations equations
     if (family.causality == Causality::independent) tangent_.time += changes.values[k];
   }
   if (equations == Equations::running) {
-    tangent_.follow(standing.time, standing.state, *standing.modes);
+    tangent_.follow(standing.since_origin, standing.state, *standing.modes);
     return tangent();
   }
   const Parameters direction = parameters_along(changes);
-  tangent_.follow_parameters(direction, standing.time, standing.state, *standing.modes);
+  tangent_.follow_parameters(direction, standing.since_origin, standing.state, *standing.modes);
   if (view.x_star != nullptr) {
     x_star_ = nash_equilibrium_along(*loop_->parameters().cost, *direction.cost, loop_->shape(), view.x_star);
   }
@@ -54,7 +54,7 @@ Parameters DirectionalDerivative::parameters_along(const Changes& changes) const
 Tangent DirectionalDerivative::along_run(const View& view, const Standing& standing) {
   tangent_.clear();
   std::copy_n(view.rate, tangent_.state.size(), tangent_.state.begin());
-  tangent_.follow(standing.time, standing.state, *standing.modes);
+  tangent_.follow(standing.since_origin, standing.state, *standing.modes);
   std::fill(x_star_.begin(), x_star_.end(), 0.0);
   return tangent();
 }

@@ -21,6 +21,12 @@ void Evaluation::act(const Settings& settings) {
   act(settings.input);
 }
 
+void Evaluation::set_time_origin(Real time_origin) {
+  if (time_origin == loop_.time_origin()) return;
+  loop_.set_time_origin(time_origin);
+  moved();
+}
+
 // Importers set their inputs at every evaluation, changed or not.
 void Evaluation::act(const ExternalDisturbance& input) {
   if (std::memcmp(input.numbers().data(), input_.numbers().data(), input.numbers().size_bytes()) == 0) return;
@@ -35,7 +41,7 @@ void Evaluation::prepare(Stage stage, Settings& settings, const Standing& standi
     case Stage::statistics:
       break;
     case Stage::input:
-      settings.input.values(standing.time, d_ext_as_set_.data());
+      settings.input.values(standing.since_origin, d_ext_as_set_.data());
       break;
     case Stage::signals:
       prepare_signals(standing);
@@ -48,8 +54,8 @@ void Evaluation::prepare(Stage stage, Settings& settings, const Standing& standi
 
 void Evaluation::prepare_signals(const Standing& standing) {
   if (signals_valid_) return;
-  input_.values(standing.time, d_ext_.data());
-  loop_.evaluate(standing.time, standing.state, d_ext_.data(), *standing.modes, signals_, rate_.data());
+  input_.values(standing.since_origin, d_ext_.data());
+  loop_.evaluate(standing.since_origin, standing.state, d_ext_.data(), *standing.modes, signals_, rate_.data());
   signals_valid_ = true;
 }
 

@@ -9,7 +9,8 @@ namespace mixed_order_game {
 
 /// Where a run stands.
 struct Standing {
-  Real time = 0.0;
+  Real time = 0.0;          ///< absolute, s
+  Real since_origin = 0.0;  ///< the same, from the loop's time origin on
   const Real* state = nullptr;
   const Modes* modes = nullptr;
 };
@@ -26,6 +27,8 @@ class Evaluation {
   /// These settings, or this input, act from here on.
   void act(const Settings& settings);
   void act(const ExternalDisturbance& input);
+  /// The loop counts time from here on, s.
+  void set_time_origin(Real time_origin);
   /// The run stands somewhere else, or goes on from another run.
   void moved() { signals_valid_ = false; }
   /// The costs, whose equilibrium is asked for, are others.

@@ -20,4 +20,7 @@ inline Real time_tolerance(Real t, Real h) {
   return 64.0 * std::numeric_limits<Real>::epsilon() * std::fabs(t) + 1e-9 * std::fabs(h);
 }
 
+/// How far a step of size h may end, at t, after the stop time: sums of steps stray by more than one rounding.
+inline Real stop_tolerance(Real t, Real h) { return time_tolerance(t, h) + 1e-4 * h; }
+
 }  // namespace mixed_order_game

@@ -55,7 +55,8 @@ Instance::Instance(Model model, Interface interface)
 Standing Instance::standing() const {
   if (co_simulation_) return co_simulation_->standing();
   if (model_exchange_) return model_exchange_->standing();
-  return {.time = experiment_.start_time, .state = initial_state_.data(), .modes = &initial_modes_};
+  return {
+      .time = experiment_.start_time, .since_origin = 0.0, .state = initial_state_.data(), .modes = &initial_modes_};
 }
 
 Statistics Instance::statistics() const {
@@ -85,7 +86,7 @@ void require_valid(const Experiment& experiment) {
 void Instance::setup_experiment(const Experiment& experiment) {
   require_valid(experiment);
   experiment_ = experiment;
-  evaluation_.moved();
+  evaluation_.set_time_origin(experiment_.start_time);
 }
 
 void Instance::enter_initialization() { phase_ = Phase::initialization; }
@@ -100,12 +101,13 @@ void Instance::exit_initialization() {
   }
   if (interface_ == Interface::model_exchange) {
     model_exchange_.emplace(evaluation_,
-                            ModelExchange::Point{experiment_.start_time, initial_state_, initial_modes_, 0});
+                            ModelExchange::Point{experiment_.start_time, initial_state_, initial_modes_, 0},
+                            experiment_.start_time);
     phase_ = Phase::event_mode;
     return;
   }
   auto run = std::make_unique<CoSimulation>(evaluation_);
-  run->start(experiment_.start_time, tolerances(), model_.variables.save(settings_));
+  run->start(tolerances(), model_.variables.save(settings_));
   co_simulation_ = std::move(run);
   evaluation_.moved();
   phase_ = Phase::step_complete;
@@ -114,6 +116,7 @@ void Instance::exit_initialization() {
 void Instance::reset() {
   settings_ = Settings(model_.game);
   experiment_ = {};
+  evaluation_.set_time_origin(experiment_.start_time);
   co_simulation_.reset();
   model_exchange_.reset();
   touched_ = Change::parameters;
@@ -244,7 +247,7 @@ void Instance::set_input_derivative(int slot, int order, Real value) {
   constexpr int highest = ExternalDisturbance::highest_derivative;
   static_assert(highest == 3);
   ExternalDisturbance& input = settings_.input;
-  const Real t = standing().time;
+  const Real t = standing().since_origin;
   const auto polynomial = [&] { return input.numbers().subspan(at(slot) * (highest + 2), highest + 2); };
   const auto is_constant = [&] {
     return std::all_of(polynomial().begin() + 1, polynomial().begin() + highest + 1, [](Real c) { return c == 0.0; });
@@ -506,12 +509,13 @@ bool Instance::restore(const Snapshot& snapshot) {
 
   settings_ = std::move(settings);
   experiment_ = snapshot.experiment;
+  evaluation_.set_time_origin(experiment_.start_time);
   touched_ = Change::parameters;
   failed_ = false;
   evaluation_.moved();
   evaluation_.costs_changed();
   model_exchange_.reset();
-  if (point) model_exchange_.emplace(evaluation_, std::move(*point));
+  if (point) model_exchange_.emplace(evaluation_, std::move(*point), experiment_.start_time);
   if (!snapshot.co_simulation) {
     co_simulation_.reset();
     phase_ = snapshot.phase;

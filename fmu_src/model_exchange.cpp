@@ -1,21 +1,33 @@
 #include "model_exchange.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <cstring>
 #include <utility>
 
 namespace mixed_order_game {
 
-ModelExchange::ModelExchange(Evaluation& evaluation, Point start) : evaluation_(evaluation), point_(std::move(start)) {
+ModelExchange::ModelExchange(Evaluation& evaluation, Point start, Real start_time)
+    : evaluation_(evaluation), point_(std::move(start)), start_time_(start_time) {
+  moved();
+}
+
+// Importers may set any time, far from the start that they gave, too. The origin follows in long strides: it depends on
+// nothing but the time, and what counts from it keeps its digits.
+void ModelExchange::moved() {
+  constexpr Real stride = 4096.0;  // s
+  evaluation_.set_time_origin(start_time_ + stride * std::floor((point_.time - start_time_) / stride));
   evaluation_.moved();
 }
 
-Standing ModelExchange::standing() const { return {point_.time, point_.state.data(), &point_.modes}; }
+Standing ModelExchange::standing() const {
+  return {point_.time, point_.time - evaluation_.loop().time_origin(), point_.state.data(), &point_.modes};
+}
 
 void ModelExchange::set_time(Real t) {
   if (t == point_.time) return;
   point_.time = t;
-  evaluation_.moved();
+  moved();
 }
 
 void ModelExchange::set_state(std::span<const Real> state) {

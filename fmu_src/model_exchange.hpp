@@ -20,7 +20,7 @@ class ModelExchange {
   };
 
   /// The evaluation must outlive the run.
-  ModelExchange(Evaluation& evaluation, Point start);
+  ModelExchange(Evaluation& evaluation, Point start, Real start_time);
 
   [[nodiscard]] Standing standing() const;
   [[nodiscard]] Statistics statistics() const { return {.events = point_.events}; }
@@ -34,8 +34,11 @@ class ModelExchange {
   [[nodiscard]] const Point& save() const { return point_; }
 
  private:
+  void moved();
+
   Evaluation& evaluation_;
   Point point_;
+  Real start_time_;
 };
 
 }  // namespace mixed_order_game

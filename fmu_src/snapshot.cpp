@@ -13,7 +13,7 @@ namespace mixed_order_game {
 namespace {
 
 constexpr std::string_view magic = "MOGstate";
-constexpr std::uint32_t format = 2;
+constexpr std::uint32_t format = 3;
 constexpr std::size_t fingerprint_size = 16;
 
 class Writer {
@@ -124,8 +124,9 @@ void write_statistics(Writer& writer, const Statistics& statistics) {
 }
 
 void write_co_simulation(Writer& writer, const CoSimulation::Point& point) {
-  const auto& [acting, checkpoint] = point;
+  const auto& [acting, time, checkpoint] = point;
   writer.numbers(acting);
+  writer.number(time);
   writer.number(checkpoint.restart_time);
   writer.numbers(checkpoint.restart_state);
   write_modes(writer, checkpoint.restart_modes);
@@ -223,9 +224,9 @@ std::size_t serialized_size(const Snapshot& snapshot, std::string_view guid) {
   // interface, phase, experiment, settings, flag
   std::size_t size = 1 + 1 + 9 + 8 + 9 + 8 + 8 * snapshot.settings.size() + 1;
   if (snapshot.co_simulation) {
-    const auto& [acting, checkpoint] = *snapshot.co_simulation;
+    const auto& [acting, time, checkpoint] = *snapshot.co_simulation;
     constexpr std::size_t statistics = 5 * 8;
-    size += 8 + 8 * acting.size() + 8;
+    size += 8 + 8 * acting.size() + 8 + 8;
     size += 8 + 8 * checkpoint.restart_state.size() + 8 + checkpoint.restart_modes.size() + statistics + 8;
     size += 8 + 8 + 8 * checkpoint.state.size() + 8 + checkpoint.modes.size() + statistics;
   }
@@ -281,7 +282,11 @@ Snapshot from_bytes(std::span<const char> bytes, std::string_view guid, const Sn
   if (has_run && shape.interface == Interface::co_simulation) {
     CoSimulation::Point& point = snapshot.co_simulation.emplace();
     reader.numbers(shape.settings, point.acting);
+    point.time = reader.real();
     point.checkpoint = read_checkpoint(reader, shape);
+    if (point.checkpoint.time != point.time - snapshot.experiment.start_time) {
+      Reader::refuse("its times do not fit together");
+    }
   } else if (has_run) {
     snapshot.model_exchange = read_model_exchange(reader, shape);
   }

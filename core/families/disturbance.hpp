@@ -1,4 +1,4 @@
-// External disturbances d_i(t) of the plants, as the closed loop sees them.
+// External disturbances d_i of the plants, as the closed loop sees them: functions of absolute time.
 #pragma once
 
 #include <memory>
@@ -14,7 +14,10 @@ class Disturbance : public GameFamily {
   using GameFamily::GameFamily;
   [[nodiscard]] virtual std::unique_ptr<Disturbance> clone() const = 0;
 
-  /// d[entry(i, l)] = d_il(t); t in seconds.
+  /// The absolute time [s] from which every t below counts; call refresh() after changing it.
+  Real time_origin = 0.0;
+
+  /// d[entry(i, l)] = d_il(time_origin + t); t in seconds.
   virtual void values(Real t, Real* d) const = 0;
   virtual void values(const CoefficientsAs<Dual>& coefficients, const Dual& t, Dual* d) const = 0;
   virtual void values(const CoefficientsAs<Dependencies>& coefficients, const Dependencies& t,

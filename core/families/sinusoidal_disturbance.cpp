@@ -1,5 +1,6 @@
 #include "families/sinusoidal_disturbance.hpp"
 
+#include "angle_reduction.hpp"
 #include "kernels/kernels.hpp"
 
 namespace mixed_order_game {
@@ -36,22 +37,40 @@ constexpr Coefficient declared[] = {
 }  // namespace
 
 SinusoidalDisturbance::SinusoidalDisturbance(int players, int dimension)
-    : Disturbance(Coefficients(declared, players, dimension)) {}
+    : Disturbance(Coefficients(declared, players, dimension)) {
+  refresh();
+}
 
 std::unique_ptr<Disturbance> SinusoidalDisturbance::clone() const {
   return std::make_unique<SinusoidalDisturbance>(*this);
 }
 
+void SinusoidalDisturbance::refresh() {
+  phase_at_origin_ = coefficients[phase];
+  if (time_origin == 0.0) return;
+  for (std::size_t p = 0; p < phase_at_origin_.size(); ++p) {
+    phase_at_origin_[p] = reduced_angle(coefficients[frequency][p], time_origin, coefficients[phase][p]);
+  }
+}
+
+Dual SinusoidalDisturbance::phase_at_origin(const CoefficientsAs<Dual>& along, int p) const {
+  return {phase_at_origin_[at(p)], along.value(frequency, p).along * time_origin + along.value(phase, p).along};
+}
+
+Dependencies SinusoidalDisturbance::phase_at_origin(const CoefficientsAs<Dependencies>& of, int p) const {
+  return of.value(frequency, p) * time_origin + of.value(phase, p);
+}
+
 void SinusoidalDisturbance::values(Real t, Real* d) const {
   const auto entries = static_cast<int>(coefficients[amplitude].size());
   kernels().sinusoid(entries, t, coefficients[amplitude].data(), coefficients[frequency].data(),
-                     coefficients[phase].data(), coefficients[bias].data(), d);
+                     phase_at_origin_.data(), coefficients[bias].data(), d);
 }
 
 template <typename Scalar>
 void SinusoidalDisturbance::values_as(const CoefficientsAs<Scalar>& of, const Scalar& t, Scalar* d) const {
   for (int p = 0; p < static_cast<int>(coefficients[amplitude].size()); ++p) {
-    d[p] = of.value(bias, p) + of.value(amplitude, p) * sin(of.value(frequency, p) * t + of.value(phase, p));
+    d[p] = of.value(bias, p) + of.value(amplitude, p) * sin(of.value(frequency, p) * t + phase_at_origin(of, p));
   }
 }
 

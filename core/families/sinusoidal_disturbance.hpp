@@ -12,7 +12,7 @@ class SinusoidalDisturbance final : public Disturbance {
   SinusoidalDisturbance(int players, int dimension);
 
   [[nodiscard]] std::unique_ptr<Disturbance> clone() const override;
-  void refresh() override {}
+  void refresh() override;
   void values(Real t, Real* d) const override;
   void values(const CoefficientsAs<Dual>& along, const Dual& t, Dual* d) const override;
   void values(const CoefficientsAs<Dependencies>& of, const Dependencies& t, Dependencies* d) const override;
@@ -20,6 +20,10 @@ class SinusoidalDisturbance final : public Disturbance {
  private:
   template <typename Scalar>
   void values_as(const CoefficientsAs<Scalar>& of, const Scalar& t, Scalar* d) const;
+  [[nodiscard]] Dual phase_at_origin(const CoefficientsAs<Dual>& along, int p) const;
+  [[nodiscard]] Dependencies phase_at_origin(const CoefficientsAs<Dependencies>& of, int p) const;
+
+  std::vector<Real> phase_at_origin_;  ///< frequency time_origin + phase; a large origin does not cost it digits
 };
 
 }  // namespace mixed_order_game

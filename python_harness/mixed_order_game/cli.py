@@ -161,9 +161,11 @@ def run(
         typer.Option("--set", metavar="NAME=VALUE", help="Start value of a parameter or input; repeatable."),
     ] = None,
     stop_time: Annotated[
-        float | None, typer.Option(help="End of the run in s.", show_default="FMU's")
+        float | None, typer.Option(help="End of the run in s.", show_default="start plus the FMU's")
     ] = None,
-    start_time: Annotated[float, typer.Option(help="Beginning of the run in s.")] = 0.0,
+    start_time: Annotated[
+        float, typer.Option(help="Beginning of the run in s; any, such as Unix time.")
+    ] = 0.0,
     step: Annotated[
         float | None, typer.Option(help="Time between samples in s.", show_default="FMU's")
     ] = None,
@@ -214,7 +216,7 @@ def run(
         output_option(output, RESULT, inputs=[game, graph_schedule, disturbance], force=force)
     with Simulator(game) as simulator, _progress() as show:
         model = simulator.model
-        stop = model.stop_time if stop_time is None else stop_time
+        stop = start_time + model.stop_time if stop_time is None else stop_time
         span = stop - start_time
         schedule = None if graph_schedule is None else read_graph_schedule(graph_schedule, model)
         if schedule is not None:

@@ -14,6 +14,7 @@ from .errors import ResultError
 from .model import Model, Value
 from .names import gather, indices_of
 from .results import Result
+from .times import in_seconds, time_slack
 
 FloatArray = NDArray[np.float64]
 
@@ -103,9 +104,9 @@ def sampled_metrics(
     """Figures of samples: time (T,) in s, deviation x - x* (T, N, D), controls u (T, N, D) or None."""
     error = np.abs(deviation).max(axis=(1, 2))
     begin = time[0] + FINAL_PART * (time[-1] - time[0]) if settle_time is None else settle_time
-    late = time >= begin - 1e-9 * (1.0 + abs(begin))
+    late = time >= begin - time_slack(begin, time[-1])
     if not late.any():
-        raise ResultError(f"there is no sample from {begin:g} s on")
+        raise ResultError(f"there is no sample from {in_seconds(begin)} on")
     width = SETTLED * float(error[0]) if band is None else band
     return Metrics(
         settling_time=settling_time(time, error, width),
@@ -132,7 +133,7 @@ def settling_time(time: FloatArray, error: FloatArray, band: float) -> float:
         return float("nan")
     high, low = float(error[last]), float(error[last + 1])
     part = np.log(high / band) / np.log(high / low) if low > 0.0 else 1.0
-    return float(time[last] + part * (time[last + 1] - time[last]) - time[0])
+    return float((time[last] - time[0]) + part * (time[last + 1] - time[last]))
 
 
 def overshoot(deviation: FloatArray) -> float:

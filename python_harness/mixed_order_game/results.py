@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from .errors import ResultError, reason
 from .names import gather, indices_of, parse_name
 from .reading import ReadError, expect_file, number_of, read_table, suffix_of
+from .times import in_seconds, time_slack
 from .writing import RESULT, write_file
 
 if TYPE_CHECKING:
@@ -66,7 +67,7 @@ class Result:
                 raise ResultError(f"{name} has {column.shape} samples, time has {self.time.shape}")
 
     def __repr__(self) -> str:
-        span = f"{self.time[0]:g} to {self.time[-1]:g} s" if len(self.time) else "empty"
+        span = f"{self.time[0]:.15g} to {in_seconds(self.time[-1])}" if len(self.time) else "empty"
         error = (
             f", nash_error {self['nash_error'][-1]:.3g} at the end" if "nash_error" in self.columns else ""
         )
@@ -187,10 +188,10 @@ class Result:
 
     def window(self, begin: float, end: float) -> NDArray[np.bool_]:
         """(T,), true for samples in [begin, end], in s, rounding forgiven. Raises ResultError if none is."""
-        slack = 1e-9 * (1.0 + float(np.max(np.abs(self.time), initial=0.0)))
+        slack = time_slack(*self.time[[0, -1]]) if len(self.time) else 0.0
         chosen = (self.time >= begin - slack) & (self.time <= end + slack)
         if not chosen.any():
-            raise ResultError(f"there is no sample from {begin:g} to {end:g} s")
+            raise ResultError(f"there is no sample from {begin:.15g} to {in_seconds(end)}")
         return chosen
 
     def _signal(self, stem: str) -> FloatArray:

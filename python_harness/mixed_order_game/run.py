@@ -29,6 +29,7 @@ from .names import split_names
 from .results import Result
 from .schedule import Disturbance
 from .temporary import explained, new_folder
+from .times import in_seconds
 from .turn import Turn, in_turn
 from .version import package_version
 
@@ -53,7 +54,7 @@ def run(
     fmu: Path | str | None = None,
     *,
     start_values: Mapping[str, Value] | None = None,
-    stop_time: float = 20.0,
+    stop_time: float | None = None,
     start_time: float = 0.0,
     step: float = 0.02,
     tolerance: float = 1e-6,
@@ -168,7 +169,7 @@ class Simulator:
         self,
         *,
         start_values: Mapping[str, Value] | None = None,
-        stop_time: float = 20.0,
+        stop_time: float | None = None,
         start_time: float = 0.0,
         step: float = 0.02,
         tolerance: float = 1e-6,
@@ -179,6 +180,8 @@ class Simulator:
     ) -> Result:
         """Run from start_time to stop_time, in s, and sample every step, both ends included.
 
+        start_time: any, Unix time, say; disturbances are functions of it. stop_time: default start_time plus
+            the FMU's stop time.
         start_values: parameters and inputs to set first, others keep the FMU's start values; a stands for
             every a[i,j], here, in changes and in outputs.
         step: communication step in s; the last one is shorter if the horizon is not a multiple of it.
@@ -200,6 +203,8 @@ class Simulator:
         """
         if self._slave is None:
             raise SimulationError("the simulator is closed")
+        if stop_time is None:
+            stop_time = number_argument(start_time, "start_time", SimulationError) + self.model.stop_time
         start_time, stop_time, step, tolerance = (
             number_argument(value, name, SimulationError)
             for name, value in (
@@ -363,10 +368,10 @@ class _Function(_Inputs):
         self._function = function
 
     def set(self, slave: Any, time: float) -> None:
-        value = array_argument(self._function(time), f"inputs({time:g})", SimulationError)
+        value = array_argument(self._function(time), f"inputs({time:.15g})", SimulationError)
         if value.shape != self._shape:
-            raise SimulationError(f"inputs({time:g}) has the shape {value.shape}, not {self._shape}")
-        _check_finite(value, f"inputs({time:g})")
+            raise SimulationError(f"inputs({time:.15g}) has the shape {value.shape}, not {self._shape}")
+        _check_finite(value, f"inputs({time:.15g})")
         self._give(slave, value)
 
 
@@ -431,17 +436,21 @@ def _rows_of(model: Model, inputs: Disturbance, samples: NDArray[np.float64]) ->
 def _samples(start: float, stop: float, step: float) -> NDArray[np.float64]:
     """Times start, start + step, ..., stop."""
     if not (np.isfinite(start) and np.isfinite(stop) and start < stop):
-        raise SimulationError(f"stop_time = {stop:g} s is not after start_time = {start:g} s")
+        raise SimulationError(f"stop_time = {in_seconds(stop)} is not after start_time = {in_seconds(start)}")
     if not (np.isfinite(step) and step > 0.0):
         raise SimulationError(f"step = {step:g} s is not positive")
     intervals = (stop - start) / step
     if intervals > LARGEST_SAMPLES:
         raise SimulationError(f"step = {step:g} s gives more than {LARGEST_SAMPLES} samples")
     whole = max(1, round(intervals))
-    if abs(intervals - whole) <= 1e-9 * whole:
-        return start + (stop - start) * (np.arange(whole + 1) / whole)
-    inner = start + step * np.arange(int(intervals) + 1)
-    return np.append(inner, stop)
+    spacing = float(np.spacing(max(abs(start), abs(stop))))
+    if abs(intervals - whole) <= 1e-9 * whole + 2.0 * spacing / step:
+        times = start + (stop - start) * (np.arange(whole + 1) / whole)
+    else:
+        times = np.append(start + step * np.arange(int(intervals) + 1), stop)
+    if np.diff(times).min() <= 0.0:
+        raise SimulationError(f"step = {step:g} s is below the resolution of times at {in_seconds(stop)}")
+    return times
 
 
 def _schedule(model: Model, changes: Changes, samples: NDArray[np.float64]) -> dict[float, dict[str, Value]]:
@@ -452,7 +461,9 @@ def _schedule(model: Model, changes: Changes, samples: NDArray[np.float64]) -> d
     when = np.array(sorted(times), dtype=np.float64)
     for time, point in zip(when.tolist(), _on_samples(when, samples).tolist(), strict=True):
         if not start <= point < stop:
-            raise SimulationError(f"the change at {time:g} s is outside [{start:g}, {stop:g}) s")
+            raise SimulationError(
+                f"the change at {in_seconds(time)} is outside [{start:.15g}, {stop:.15g}) s"
+            )
         values = {
             name: check_value(model.variable(name), value, during_run=True)
             for name, value in model.expanded(changes[times[time]]).items()

@@ -55,7 +55,7 @@ class GraphSchedule:
     def start_values(self, start_time: float = 0.0) -> dict[str, Value]:
         """Edge weights in force at the beginning of the run, for start_values of a run; may be empty."""
         values: dict[str, Value] = {}
-        for time, weights in self._until(start_time):
+        for time, weights in self._between(start_time, start_time):
             if time <= start_time:
                 values |= weights
         return values
@@ -63,18 +63,22 @@ class GraphSchedule:
     def changes(self, stop_time: float, start_time: float = 0.0) -> dict[float, dict[str, Value]]:
         """What is set between start and stop, for changes of a run."""
         return {
-            time: dict(weights) for time, weights in self._until(stop_time) if start_time < time < stop_time
+            time: dict(weights)
+            for time, weights in self._between(start_time, stop_time)
+            if start_time < time < stop_time
         }
 
-    def _until(self, stop: float) -> Iterable[tuple[float, Mapping[str, float]]]:
+    def _between(self, start: float, stop: float) -> Iterable[tuple[float, Mapping[str, float]]]:
+        """Every entry until stop from the one before the repetition that holds start."""
         if self.period is None:
             yield from self.entries
             return
         first = self.entries[0][0]
-        repetitions = max(0, int((stop - first) / self.period)) + 1
-        if repetitions * len(self.entries) > LARGEST_ENTRIES:
+        begin = max(0, int((start - first) / self.period) - 1)
+        end = max(0, int((stop - first) / self.period)) + 1
+        if (end - begin) * len(self.entries) > LARGEST_ENTRIES:
             raise ScheduleError(f"the period {self.period:g} s gives more than {LARGEST_ENTRIES} graphs")
-        for k in range(repetitions):
+        for k in range(begin, end):
             for time, weights in self.entries:
                 yield time + k * self.period, weights
 

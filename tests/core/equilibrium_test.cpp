@@ -67,9 +67,9 @@ TEST(NashEquilibrium, IsRefusedWhereItIsNotUnique) {
 TEST(NashEquilibrium, IsRefusedWhereAPlayerCouldLowerItsCost) {
   const Shape shape{.players = 2, .dimension = 1, .neurons = 1, .order = {1, 1}};
   QuadraticCost cost(2, 1);
-  cost.quadratic = {0.3, 0.3};
-  cost.linear = {1.0, 0.0};
-  cost.coupling = {0.0, 2.0, -2.0, 0.0};
+  cost.coefficients[QuadraticCost::quadratic] = {0.3, 0.3};
+  cost.coefficients[QuadraticCost::linear] = {1.0, 0.0};
+  cost.coefficients[QuadraticCost::coupling] = {0.0, 2.0, -2.0, 0.0};
   cost.refresh();
   try {
     nash_equilibrium(cost, shape);
@@ -78,23 +78,24 @@ TEST(NashEquilibrium, IsRefusedWhereAPlayerCouldLowerItsCost) {
     EXPECT_EQ(std::string(error.what()).find("player[2].cost is concave"), 0U) << error.what();
   }
   // f_1 = -2 x_1 x_2 + x_2^2 and f_2 = 2 x_1 x_2 - x_1^2, linear in the own action, have an equilibrium at 0
-  cost.quadratic = {-1.0, 1.0};
-  cost.linear = {0.0, 0.0};
-  cost.coupling = {0.0, 1.0, -1.0, 0.0};
+  cost.coefficients[QuadraticCost::quadratic] = {-1.0, 1.0};
+  cost.coefficients[QuadraticCost::linear] = {0.0, 0.0};
+  cost.coefficients[QuadraticCost::coupling] = {0.0, 1.0, -1.0, 0.0};
   cost.refresh();
   EXPECT_EQ(nash_equilibrium(cost, shape), std::vector<Real>(2, 0.0));
   // 0.1 + 0.2 - 0.3 is no curvature, and neither is its rounding error in either direction
   for (const Real sign : {1.0, -1.0}) {
     const Shape three{.players = 3, .dimension = 1, .neurons = 1, .order = {1, 1, 1}};
     QuadraticCost flat(3, 1);
-    flat.quadratic = {-0.3 * sign, 1.0, 1.0};
-    flat.coupling = {0.0, 0.1 * sign, 0.2 * sign, -0.2 * sign, 0.0, 0.0, -0.2 * sign, 0.0, 0.0};
+    flat.coefficients[QuadraticCost::quadratic] = {-0.3 * sign, 1.0, 1.0};
+    flat.coefficients[QuadraticCost::coupling] = {0.0, 0.1 * sign,  0.2 * sign, -0.2 * sign, 0.0,
+                                                  0.0, -0.2 * sign, 0.0,        0.0};
     flat.refresh();
     EXPECT_NO_THROW(nash_equilibrium(flat, three));
   }
   // however small the costs are
-  cost.quadratic = {1.0, -1e-9};
-  cost.coupling = {0.0, 1.0, 0.0, 0.0};
+  cost.coefficients[QuadraticCost::quadratic] = {1.0, -1e-9};
+  cost.coefficients[QuadraticCost::coupling] = {0.0, 1.0, 0.0, 0.0};
   cost.refresh();
   EXPECT_THROW(nash_equilibrium(cost, shape), GameError);
 }
@@ -102,16 +103,30 @@ TEST(NashEquilibrium, IsRefusedWhereAPlayerCouldLowerItsCost) {
 TEST(NashEquilibrium, OfRowsOfDifferentSizeIsThatOfEqualOnes) {
   const Shape shape{.players = 2, .dimension = 1, .neurons = 1, .order = {1, 1}};
   QuadraticCost cost(2, 1);
-  cost.quadratic = cost.linear = {1e-7, 1e7};
-  cost.coupling = {0.0, 1e-7, 1e7, 0.0};
+  cost.coefficients[QuadraticCost::quadratic] = {1e-7, 1e7};
+  cost.coefficients[QuadraticCost::linear] = {1e-7, 1e7};
+  cost.coefficients[QuadraticCost::coupling] = {0.0, 1e-7, 1e7, 0.0};
   cost.refresh();
   for (const Real x : nash_equilibrium(cost, shape)) EXPECT_NEAR(x, -0.5, 1e-15);
 }
 
-/// Players on a line whose gradients are J x + l, for any J.
-class AffineGradients final : public Cost {
+/// Costs of players on a line without coefficients, of which only gradients and their derivatives are asked for.
+class GradientsOnly : public Cost {
  public:
-  explicit AffineGradients(int players) : players_(players) {
+  explicit GradientsOnly(int players) : Cost(Coefficients({}, players, 1)) {}
+  [[nodiscard]] Real value(int /*i*/, const Real* /*x*/) const override { return 0.0; }
+  using Cost::own_gradients;
+  void own_gradients(const CoefficientsAs<Dual>& /*none*/, const Dual* /*points*/, int /*stride*/,
+                     Dual* /*gradient*/) const override {}
+  void own_gradients(const CoefficientsAs<Dependencies>& /*none*/, const Dependencies* /*points*/, int /*stride*/,
+                     Dependencies* /*gradient*/) const override {}
+  void refresh() override {}
+};
+
+/// Gradients J x + l, for any J.
+class AffineGradients final : public GradientsOnly {
+ public:
+  explicit AffineGradients(int players) : GradientsOnly(players), players_(players) {
     for (int i = 0; i < players; ++i) {
       for (int j = 0; j < players; ++j) pattern_.column.push_back(j);
       pattern_.start.push_back(pattern_.entries());
@@ -121,7 +136,6 @@ class AffineGradients final : public Cost {
   std::vector<Real> linear;
 
   [[nodiscard]] std::unique_ptr<Cost> clone() const override { return std::make_unique<AffineGradients>(*this); }
-  [[nodiscard]] Real value(int /*i*/, const Real* /*x*/) const override { return 0.0; }
   void own_gradients(const Real* points, int stride, Real* gradient) const override {
     for (int i = 0; i < players_; ++i) {
       gradient[i] = linear[at(i)];
@@ -132,10 +146,6 @@ class AffineGradients final : public Cost {
   void hessian_rows(const Real* /*points*/, int /*stride*/, Real* values) const override {
     std::copy(jacobian.begin(), jacobian.end(), values);
   }
-  [[nodiscard]] std::unique_ptr<Cost> zero_direction() const override { return clone(); }
-  void own_gradients_along(const Cost& /*direction*/, const Real* /*points*/, int /*stride*/,
-                           Real* /*derivative*/) const override {}
-  void refresh() override {}
 
  private:
   int players_;
@@ -175,10 +185,10 @@ TEST(NashEquilibrium, IsJudgedWhateverTheUnitsOfRowsAndColumns) {
 }
 
 /// f_1' = x_1^3 - 2 x_1 + 2, at which Newton's method from 0 goes to 1 and back for ever, and f_2' = x_2.
-class CyclingCost final : public Cost {
+class CyclingCost final : public GradientsOnly {
  public:
+  CyclingCost() : GradientsOnly(2) {}
   [[nodiscard]] std::unique_ptr<Cost> clone() const override { return std::make_unique<CyclingCost>(*this); }
-  [[nodiscard]] Real value(int /*i*/, const Real* /*x*/) const override { return 0.0; }
   void own_gradients(const Real* points, int stride, Real* gradient) const override {
     gradient[0] = points[0] * points[0] * points[0] - 2.0 * points[0] + 2.0;
     gradient[1] = points[stride + 1];
@@ -188,10 +198,6 @@ class CyclingCost final : public Cost {
     values[0] = 3.0 * points[0] * points[0] - 2.0;
     values[1] = 1.0;
   }
-  [[nodiscard]] std::unique_ptr<Cost> zero_direction() const override { return clone(); }
-  void own_gradients_along(const Cost& /*direction*/, const Real* /*points*/, int /*stride*/,
-                           Real* /*derivative*/) const override {}
-  void refresh() override {}
 
  private:
   SparseRows pattern_{.start = {0, 1, 2}, .column = {0, 1}};
@@ -212,22 +218,19 @@ TEST(NashEquilibrium, ThatIsIllConditionedConverges) {
   const Shape shape{.players = 2, .dimension = 1, .neurons = 1, .order = {1, 1}};
   for (const Real weak : {1e-6, 1e-9, 1e-12}) {
     QuadraticCost cost(2, 1);
-    cost.quadratic = {weak, 0.0};
-    cost.linear = {-6.0 * weak, 0.0};
-    cost.coupling = {0.0, 0.7, 0.3, 0.0};
+    cost.coefficients[QuadraticCost::quadratic] = {weak, 0.0};
+    cost.coefficients[QuadraticCost::linear] = {-6.0 * weak, 0.0};
+    cost.coefficients[QuadraticCost::coupling] = {0.0, 0.7, 0.3, 0.0};
     cost.refresh();
     for (const Real x : nash_equilibrium(cost, shape)) EXPECT_NEAR(x, 3.0, 1e-15 / weak);
   }
 }
 
 /// f_1 = exp(x_1 - 1) - x_1 + x_1 x_2 and f_2 = cosh(x_2) - x_1 x_2, which are not quadratic.
-class ExponentialCost final : public Cost {
+class ExponentialCost final : public GradientsOnly {
  public:
-  ExponentialCost() : Cost(Coefficients({}, 2, 1)) {}
+  ExponentialCost() : GradientsOnly(2) {}
   [[nodiscard]] std::unique_ptr<Cost> clone() const override { return std::make_unique<ExponentialCost>(*this); }
-  [[nodiscard]] Real value(int i, const Real* x) const override {
-    return i == 0 ? std::exp(x[0] - 1.0) - x[0] + x[0] * x[1] : std::cosh(x[1]) - x[0] * x[1];
-  }
   void own_gradients(const Real* points, int stride, Real* gradient) const override {
     gradient[0] = std::exp(points[0] - 1.0) - 1.0 + points[1];
     gradient[1] = std::sinh(points[stride + 1]) - points[stride];
@@ -239,11 +242,6 @@ class ExponentialCost final : public Cost {
     values[2] = -1.0;
     values[3] = std::cosh(points[stride + 1]);
   }
-  void own_gradients(const CoefficientsAs<Dual>& /*none*/, const Dual* /*points*/, int /*stride*/,
-                     Dual* /*gradient*/) const override {}
-  void own_gradients(const CoefficientsAs<Dependencies>& /*none*/, const Dependencies* /*points*/, int /*stride*/,
-                     Dependencies* /*gradient*/) const override {}
-  void refresh() override {}
 
  private:
   SparseRows pattern_{.start = {0, 2, 4}, .column = {0, 1, 0, 1}};

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 
 #include "random_game.hpp"
@@ -18,6 +19,7 @@ SinusoidalDisturbance disturbance() {
   random.fill(d.coefficients[SinusoidalDisturbance::frequency], 0.1, 9.0);
   random.fill(d.coefficients[SinusoidalDisturbance::phase], -3.0, 3.0);
   random.fill(d.coefficients[SinusoidalDisturbance::bias], -2.0, 2.0);
+  d.refresh();
   return d;
 }
 
@@ -36,6 +38,33 @@ TEST(SinusoidalDisturbance, ValuesAreTheFormula) {
   }
 }
 
+// sin(1.3 (1.76e9 + t) + 0.4) for t = 0, 1/64 and 20 from exact fractions and 110 digits of pi
+TEST(SinusoidalDisturbance, CountsFromItsOrigin) {
+  SinusoidalDisturbance d(1, 1);
+  d.coefficients[SinusoidalDisturbance::amplitude] = {1.0};
+  d.coefficients[SinusoidalDisturbance::frequency] = {1.3};
+  d.coefficients[SinusoidalDisturbance::phase] = {0.4};
+  d.time_origin = 1.76e9;
+  d.refresh();
+  SinusoidalDisturbance faster(1, 1);
+  faster.coefficients[SinusoidalDisturbance::frequency] = {1.0};
+  const CoefficientsAlong still(d.coefficients, nullptr);
+  const CoefficientsAlong moved(d.coefficients, &faster.coefficients);
+  for (const auto& [t, sine, cosine] : {std::array{0.0, -0.7787835568174883, 0.6272927320085112},
+                                        std::array{0.015625, -0.7658818927812336, 0.6429812799062153},
+                                        std::array{20.0, -0.025462757099529828, 0.9996757714383651}}) {
+    Real value = 0.0;
+    d.values(t, &value);
+    EXPECT_NEAR(value, sine, 4e-15);
+    Dual along;
+    d.values(still, {t, 1.0}, &along);
+    EXPECT_NEAR(along.value, sine, 4e-15);
+    EXPECT_NEAR(along.along, 1.3 * cosine, 4e-15);
+    d.values(moved, t, &along);
+    EXPECT_NEAR(along.along / (1.76e9 + t), cosine, 4e-15) << "along the frequency, absolute time counts";
+  }
+}
+
 TEST(SinusoidalDisturbance, DerivativesAlongTimeAndCoefficientsAreThoseOfTheValues) {
   const SinusoidalDisturbance d = disturbance();
   SinusoidalDisturbance direction = d;
@@ -50,6 +79,7 @@ TEST(SinusoidalDisturbance, DerivativesAlongTimeAndCoefficientsAreThoseOfTheValu
       for (std::size_t p = 0; p < entries; ++p) moved.coefficients[k][p] += s * direction.coefficients[k][p];
     }
     std::vector<Real> found(entries);
+    moved.refresh();
     moved.values(t + s * time_direction, found.data());
     return found;
   };

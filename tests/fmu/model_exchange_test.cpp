@@ -9,6 +9,7 @@
 #include <set>
 #include <thread>
 
+#include "angle_reduction.hpp"
 #include "importer.hpp"
 
 namespace {
@@ -635,6 +636,41 @@ TEST(ModelExchangeTime, DisturbancesFollowTheTimeSet) {
   EXPECT_NEAR(importer.get("der(x[1,1])") - now, 0.9 * (std::sin(2.0 * 0.7 + 0.1) - std::sin(0.1)), 1e-13);
   ASSERT_EQ(fmi2SetTime(importer.component, 0.0), fmi2OK);
   EXPECT_EQ(importer.get("der(x[1,1])"), now);
+}
+
+TEST(ModelExchangeTime, MayBeUnixTimeFarFromTheStartToo) {
+  const double time = 1.76e9 + 0.7;
+  Importer started;
+  Importer far;
+  Importer moved;
+  for (int i = 1; i <= 3; ++i) {
+    for (int l = 1; l <= 2; ++l) {
+      const std::string phase = "disturbance_phase" + indices(i, l);
+      const double frequency = 0.7 * i + 0.3 * l;
+      for (Importer* each : {&started, &far, &moved}) {
+        ASSERT_EQ(each->set("disturbance_frequency" + indices(i, l), frequency), fmi2OK);
+      }
+      ASSERT_EQ(moved.set(phase, mixed_order_game::reduced_angle(frequency, time, moved.get(phase))), fmi2OK);
+    }
+  }
+  started.begin(1.76e9);
+  far.begin(0.0);
+  moved.begin(0.0);
+  const std::vector<double> expected = moved.rate();
+  for (Importer* each : {&started, &far}) {
+    const std::vector<double> at_start = each->rate();
+    ASSERT_EQ(fmi2SetTime(each->component, time), fmi2OK);
+    EXPECT_EQ(each->get("time"), time);
+    const std::vector<double> rates = each->rate();
+    for (std::size_t k = 0; k < rates.size(); ++k)
+      EXPECT_NEAR(rates[k], expected[k], 1e-12 * (1.0 + std::fabs(rates[k])));
+    // a state saved there, and the way back
+    const std::vector<char> bytes = each->serialized();
+    ASSERT_EQ(fmi2SetTime(each->component, each == &far ? 0.0 : 1.76e9), fmi2OK);
+    EXPECT_EQ(each->rate(), at_start);
+    ASSERT_EQ(each->deserialize_and_set(bytes), fmi2OK);
+    EXPECT_EQ(each->rate(), rates);
+  }
 }
 
 TEST(ModelExchangeState, IsRestoredBitForBitInEveryMode) {

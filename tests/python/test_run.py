@@ -1,6 +1,7 @@
 """Runs through fmpy: samples, inputs, changes on the way, reused instances, errors in the FMU's words."""
 
 import os
+from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
@@ -8,15 +9,20 @@ import pytest
 
 from mixed_order_game import (
     GameError,
+    Result,
     SimulationError,
     Simulator,
     VariableError,
     default_game,
+    load,
     read_model,
     run,
 )
 from mixed_order_game.build import shipped_game
+from mixed_order_game.metrics import metrics
+from mixed_order_game.model import Value
 from mixed_order_game.names import parse_name
+from mixed_order_game.schedule import read_disturbance, read_graph_schedule
 from tests.conftest import FmuOf
 
 OUTPUTS = ("x", "x_star", "nash_error")
@@ -99,6 +105,80 @@ def test_samples(simulator: Simulator) -> None:
     late = simulator.run(start_time=3.0, stop_time=4.0, step=0.5)
     assert late.time.tolist() == [3.0, 3.5, 4.0]
     np.testing.assert_array_equal(late.x[0, 0], [-5.0, 8.0])
+
+
+TWO_PI = 2 * Fraction("3.14159265358979323846264338327950288419716939937510582097494459230781640628621")
+UNIX = 1.76e9
+
+
+def with_moved_phases(simulator: Simulator, start: float) -> dict[str, Value]:
+    """Frequencies and phases with which a run from 0 equals one from start, reduced in fractions."""
+    values: dict[str, Value] = {}
+    for k, index in enumerate(simulator.model.indexed("disturbance_phase")):
+        frequency, phase = 0.3 + 0.7 * k, 0.1 * k
+        angle = Fraction(frequency) * Fraction(start) + Fraction(phase)
+        values[f"disturbance_frequency[{index[0]},{index[1]}]"] = frequency
+        values[f"disturbance_phase[{index[0]},{index[1]}]"] = float(angle - round(angle / TWO_PI) * TWO_PI)
+    return values
+
+
+def test_a_run_from_unix_time_is_one_from_zero(simulator: Simulator) -> None:
+    for tolerance in (1e-4, 1e-6, 1e-10):
+
+        def case(start: float, tolerance: float = tolerance) -> Result:
+            return simulator.run(
+                start_values=with_moved_phases(simulator, UNIX - start),
+                start_time=start,
+                stop_time=start + 2.0,
+                step=1.0 / 64.0,
+                tolerance=tolerance,
+            )
+
+        late, moved = case(UNIX), case(0.0)
+        np.testing.assert_array_equal(late.time, UNIX + moved.time)
+        for name, column in moved.columns.items():
+            np.testing.assert_array_equal(late[name], column, err_msg=f"{name} at {tolerance}")
+
+
+def test_files_and_figures_of_a_run_from_unix_time(simulator: Simulator, tmp_path: Path) -> None:
+    def case(start: float) -> Result:
+        gust = tmp_path / "gust.csv"
+        gust.write_text(f'time,"d_ext[1,1]"\n{start + 1.0!r},30\n{start + 1.25!r},0\n')
+        graphs = tmp_path / "graphs.toml"
+        graphs.write_text(
+            'period = 0.5\n[[graph]]\ntime = 0.0\ngraph = "ring"\n[[graph]]\ntime = 0.25\ngraph = "star"\n'
+        )
+        schedule = read_graph_schedule(graphs, simulator.model)
+        return simulator.run(
+            start_values={**with_moved_phases(simulator, UNIX - start), **schedule.start_values(start)},
+            start_time=start,
+            stop_time=start + 2.0,
+            step=1.0 / 64.0,
+            inputs=read_disturbance(gust, simulator.model),
+            changes=schedule.changes(start + 2.0, start),
+        )
+
+    late, moved = case(UNIX), case(0.0)
+    np.testing.assert_array_equal(late.x, moved.x)
+    assert late.metrics == moved.metrics
+    assert metrics(late, settle_time=UNIX + 1.75) == metrics(moved, settle_time=1.75)
+    assert late.largest_error(UNIX + 1.5, UNIX + 2.0) == moved.largest_error(1.5, 2.0)
+    assert late.window(UNIX + 1.0, UNIX + 1.25).sum() == 17
+    assert "1760000000 to 1760000002 s" in repr(late)
+    for suffix in (".csv", ".parquet"):
+        np.testing.assert_array_equal(load(late.save(tmp_path / f"late{suffix}")).time, late.time)
+
+
+def test_samples_at_unix_time(simulator: Simulator) -> None:
+    for step in (0.02, 0.1, 0.3):
+        late = simulator.run(start_time=UNIX, stop_time=UNIX + 3.0, step=step, outputs=["x[1,1]"])
+        assert len(late.time) == round(3.0 / step) + 1
+        np.testing.assert_allclose(np.diff(late.time), step, atol=3e-7)
+    assert simulator.run(start_time=UNIX + 0.3, step=5.0, outputs=["x[1,1]"]).time[-1] == UNIX + 20.3
+    with pytest.raises(
+        SimulationError, match="step = 1e-08 s is below the resolution of times at 1760000000"
+    ):
+        simulator.run(start_time=UNIX, stop_time=UNIX + 1e-4, step=1e-8)
 
 
 def test_tolerance_is_used(simulator: Simulator) -> None:

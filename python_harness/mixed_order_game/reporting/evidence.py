@@ -1,7 +1,7 @@
 """What a report is made from: runs of one game, the judged claims, and what is known of the unknown."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +16,7 @@ from ..parameters import game_parameters
 from ..results import Result
 from ..run import Simulator
 from ..spectrum import linear_loop, spectral_abscissa
+from ..times import in_seconds
 from ..unknown_term import unknown_term
 from ..validate import Validation, validate
 
@@ -27,6 +28,9 @@ MOST_ESTIMATING = 12
 ON_SPHERE = 1e-9
 """Relative distance of w'w from W_max within which a column counts as on the sphere."""
 
+
+FAR = 1e3
+"""Durations of a run from which on its start, Unix time, say, would fill the axis of time with digits."""
 
 STORED = (
     "This page is made from a stored run: what needs the game itself, the claims, the predicted rate and the "
@@ -117,10 +121,12 @@ def evidence_of_game(
 
 def evidence_of_result(result: Result) -> Evidence:
     """A report of a stored run alone: no claims, no prediction, no unknown term."""
-    return Evidence(
-        result=result,
-        notes=(STORED,),
-    )
+    notes = [STORED]
+    start, span = float(result.time[0]), float(result.time[-1] - result.time[0])
+    if abs(start) > FAR * span:
+        result = replace(result, time=result.time - start)
+        notes.append(f"Times count from the start of the run at {in_seconds(start)}.")
+    return Evidence(result=result, notes=tuple(notes))
 
 
 def shared_signal(result: Result) -> FloatArray | None:
