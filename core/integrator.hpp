@@ -1,4 +1,4 @@
-// Integrates the closed loop by CVODE (BDF, Newton), with the projection's events located and never stepped over.
+// Integrates the closed loop by CVODE (BDF, Newton), with the projection's events located by their signs.
 // Entering the sphere makes the rates jump and restarts CVODE; leaving it does not.
 //
 // CVODE takes its internal steps one by one and outputs are interpolated, so the sequence of internal steps depends on

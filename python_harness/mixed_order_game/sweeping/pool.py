@@ -203,9 +203,7 @@ class DaskPool:
         try:
             import distributed
         except ImportError as error:
-            raise PoolError(
-                "a Dask scheduler needs distributed: pip install mixed-order-game[dask]"
-            ) from error
+            raise PoolError("a Dask scheduler needs distributed: pip install distributed") from error
         client: Any = distributed.Client
         try:
             self._client: Any = client(scheduler, timeout="10s", set_as_default=False)
