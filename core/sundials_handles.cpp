@@ -1,6 +1,7 @@
 #include "sundials_handles.hpp"
 
 #include <nvector/nvector_serial.h>
+#include <sundials/sundials_logger.h>
 
 #include <algorithm>
 #include <array>
@@ -8,7 +9,6 @@
 #include <memory>
 #include <new>
 
-#include "errors.hpp"
 #include "kernels/kernels.hpp"
 #include "nordsieck_prediction.hpp"
 #include "types.hpp"
@@ -17,28 +17,51 @@ namespace mixed_order_game {
 
 namespace {
 
-// A serial vector whose data begin on a cache line (the library's own begin anywhere), with what it shares with all of
-// its clones.
+// What a vector shares with all of its clones. N_VClone writes to what a failed clone returned (before SUNDIALS 7.2),
+// so that it must never be null: when memory is short a clone is the spare vector, which is good enough until the
+// set-up is given up.
+struct Shared {
+  explicit Shared(std::int64_t size) : prediction(size) {}
+  ~Shared();
+  Shared(const Shared&) = delete;
+  Shared& operator=(const Shared&) = delete;
+
+  NordsieckPrediction prediction;
+  N_Vector spare = nullptr;
+  bool memory_is_short = false;
+};
+
+// A serial vector whose data begin on a cache line (the library's own begin anywhere).
 struct Content {
   _N_VectorContent_Serial serial;  // first, so that the library's macros find it
-  std::shared_ptr<NordsieckPrediction> prediction;
+  std::shared_ptr<Shared> shared;
 };
 constexpr std::align_val_t cache_line{64};
 
-NordsieckPrediction& prediction_of(N_Vector vector) { return *static_cast<Content*>(vector->content)->prediction; }
+Shared& shared_by(N_Vector vector) { return *static_cast<Content*>(vector->content)->shared; }
+NordsieckPrediction& prediction_of(N_Vector vector) { return shared_by(vector).prediction; }
 
-void destroy_vector(N_Vector vector) {
-  prediction_of(vector).forget();
+void free_vector(N_Vector vector) {
   ::operator delete(NV_DATA_S(vector), cache_line);
   delete static_cast<Content*>(vector->content);
   N_VFreeEmpty(vector);
 }
 
+Shared::~Shared() {
+  if (spare != nullptr) free_vector(spare);
+}
+
+void destroy_vector(N_Vector vector) {
+  if (vector == shared_by(vector).spare) return;
+  prediction_of(vector).forget();
+  free_vector(vector);
+}
+
 /// A vector without operations; null when memory is short.
-N_Vector allocate_vector(SunIndex size, const std::shared_ptr<NordsieckPrediction>& prediction, SUNContext context) {
+N_Vector allocate_vector(SunIndex size, const std::shared_ptr<Shared>& shared, SUNContext context) {
   N_Vector vector = N_VNewEmpty(context);
   if (vector == nullptr) return nullptr;
-  auto* content = new (std::nothrow) Content{{size, SUNFALSE, nullptr}, prediction};
+  auto* content = new (std::nothrow) Content{{size, SUNFALSE, nullptr}, shared};
   auto* data =
       static_cast<SunReal*>(::operator new(static_cast<std::size_t>(size) * sizeof(SunReal), cache_line, std::nothrow));
   if (content == nullptr || data == nullptr) {
@@ -53,8 +76,12 @@ N_Vector allocate_vector(SunIndex size, const std::shared_ptr<NordsieckPredictio
 }
 N_Vector clone_vector(N_Vector vector) {
   const Content& content = *static_cast<Content*>(vector->content);
-  N_Vector clone = allocate_vector(content.serial.length, content.prediction, vector->sunctx);
-  if (clone != nullptr) N_VCopyOps(vector, clone);
+  N_Vector clone = allocate_vector(content.serial.length, content.shared, vector->sunctx);
+  if (clone == nullptr) {
+    content.shared->memory_is_short = true;
+    return content.shared->spare;
+  }
+  N_VCopyOps(vector, clone);
   return clone;
 }
 
@@ -125,12 +152,35 @@ SunReal vector_max_norm(N_Vector x) {
 
 }  // namespace
 
+#if SUNDIALS_VERSION_MAJOR < 7
+// These stand in for the library's logger, which nobody reads: its own has files and a table that is written to even
+// when there was no memory for it.
+extern "C" {
+int SUNLogger_Create(void* /*communicator*/, int /*rank*/, SUNLogger* logger) {
+  *logger = nullptr;
+  return 0;
+}
+int SUNLogger_CreateFromEnv(void* communicator, SUNLogger* logger) { return SUNLogger_Create(communicator, 0, logger); }
+int SUNLogger_SetErrorFilename(SUNLogger, const char*) { return 0; }
+int SUNLogger_SetWarningFilename(SUNLogger, const char*) { return 0; }
+int SUNLogger_SetInfoFilename(SUNLogger, const char*) { return 0; }
+int SUNLogger_SetDebugFilename(SUNLogger, const char*) { return 0; }
+int SUNLogger_QueueMsg(SUNLogger, SUNLogLevel, const char*, const char*, const char*, ...) { return 0; }
+int SUNLogger_Flush(SUNLogger, SUNLogLevel) { return 0; }
+int SUNLogger_GetOutputRank(SUNLogger, int* rank) {
+  *rank = 0;
+  return 0;
+}
+int SUNLogger_Destroy(SUNLogger*) { return 0; }
+}
+#endif
+
 ContextHandle make_context() {
   SUNContext context = nullptr;
 #if SUNDIALS_VERSION_MAJOR < 7
-  if (SUNContext_Create(nullptr, &context) != 0) throw Error("SUNDIALS could not make a context");
+  if (SUNContext_Create(nullptr, &context) != 0) throw std::bad_alloc();
 #else
-  if (SUNContext_Create(SUN_COMM_NULL, &context) != 0) throw Error("SUNDIALS could not make a context");
+  if (SUNContext_Create(SUN_COMM_NULL, &context) != 0) throw std::bad_alloc();
   SUNContext_ClearErrHandlers(context);
 #endif
   SUNContext_SetLogger(context, nullptr);
@@ -141,7 +191,9 @@ VectorHandle make_vector(int size, SUNContext context) {
   // the library's own vector gives the operations that are not replaced
   const VectorHandle pattern(N_VNewEmpty_Serial(size, context));
   if (pattern == nullptr) throw std::bad_alloc();
-  N_Vector vector = allocate_vector(size, std::make_shared<NordsieckPrediction>(size), context);
+  const auto shared = std::make_shared<Shared>(size);
+  shared->spare = allocate_vector(size, {std::shared_ptr<Shared>(), shared.get()}, context);  // owns nothing
+  N_Vector vector = shared->spare == nullptr ? nullptr : allocate_vector(size, shared, context);
   if (vector == nullptr) throw std::bad_alloc();
   N_VCopyOps(pattern.get(), vector);
   vector->ops->nvclone = clone_vector;
@@ -154,8 +206,13 @@ VectorHandle make_vector(int size, SUNContext context) {
   vector->ops->nvmaxnorm = vector_max_norm;
   vector->ops->nvscaleaddmulti = vector_scale_add_multi;
   vector->ops->nvlinearcombination = vector_linear_combination;
+  N_VCopyOps(vector, shared->spare);
   N_VConst(0.0, vector);
   return VectorHandle(vector);
+}
+
+void require_whole(N_Vector vector) {
+  if (shared_by(vector).memory_is_short) throw std::bad_alloc();
 }
 
 MatrixHandle make_placeholder_matrix(SUNContext context) {

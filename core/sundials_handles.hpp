@@ -44,6 +44,10 @@ ContextHandle make_context();
 /// Zero, with the vector operations that CVODE spends its time in replaced by the kernels.
 VectorHandle make_vector(int size, SUNContext context);
 
+/// Throws std::bad_alloc when memory was too short for a clone of the vector since it was made: the clones then share
+/// their data and must not be used.
+void require_whole(N_Vector vector);
+
 /// For solvers that never form a matrix: CVODE only hands it on.
 MatrixHandle make_placeholder_matrix(SUNContext context);
 

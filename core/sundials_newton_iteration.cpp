@@ -24,7 +24,7 @@ int rate_failure(int result) { return result < 0 ? CV_RHSFUNC_FAIL : SUN_NLS_CON
 }  // namespace
 
 NewtonIteration::NewtonIteration(NewtonSystem& system, int size, SUNContext context)
-    : system_(system), handle_(SUNNonlinSolNewEmpty(context)), delta_(at(size)) {
+    : system_(system), delta_(at(size)), handle_(SUNNonlinSolNewEmpty(context)) {
   if (handle_ == nullptr) throw std::bad_alloc();
   using Handle = SUNNonlinearSolver;
   static constexpr auto self = [](Handle handle) { return static_cast<NewtonIteration*>(handle->content); };

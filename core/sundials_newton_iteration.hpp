@@ -68,11 +68,11 @@ class NewtonIteration {
   int iterate_again(Real* correction, const Real* weight, Real tolerance, void* cvode);
 
   NewtonSystem& system_;
-  SUNNonlinearSolver handle_;
   SUNNonlinSolLSetupFn factor_ = nullptr;
   int most_iterations_ = 3;
   Step step_{};
   AlignedVector delta_;
+  SUNNonlinearSolver handle_;  // made last: nothing after it can fail
   Real factored_gamma_ = 0.0;
   Real convergence_rate_ = 1.0;
   bool jacobian_is_current_ = false;

@@ -87,7 +87,8 @@ BEHAVIOURS = (
     "no harm.",
     "The binary needs the system's own libraries only.",
     "fmi2Instantiate survives missing arguments and understands every form of URI.",
-    "Nothing is printed; messages have declared categories; the host's surroundings stay as they are.",
+    "Nothing is printed; messages have declared categories; the host's surroundings stay as they are, in its "
+    "callbacks too; an allocation that fails is an error; loading and unloading leaves nothing behind.",
 )
 
 

@@ -1,5 +1,6 @@
 // Lifecycle, failed integrations, threads, exported symbols, hostile arguments and messages: behaviours 20 to 25.
 #include <dlfcn.h>
+#include <malloc.h>
 
 #include <cfenv>
 #include <clocale>
@@ -363,6 +364,24 @@ TEST(Behaviour22Symbols, WorksTwiceUnderDifferentNames) {
   }
   first.expect_values_of(linked);
   second.expect_values_of(linked);
+}
+
+TEST(Behaviour25Memory, LoadingAndUnloadingLeavesNothingBehind) {
+  if (MIXED_ORDER_GAME_SANITIZED) GTEST_SKIP() << "sanitizers keep what was freed";
+  const Slave like;
+  const auto load_and_run = [&] {
+    const LoadedLibrary library(MIXED_ORDER_GAME_LIBRARY);
+    const LoadedInstance instance(library, like);
+    instance.step(0.0, 0.1);
+    double value = 0.0;
+    const fmi2ValueReference unknown = 0xFFFFFFFF;  // an exception
+    EXPECT_EQ(library.function(&fmi2GetReal, "fmi2GetReal")(instance.component, &unknown, 1, &value), fmi2Error);
+  };
+  for (int k = 0; k < 3; ++k) load_and_run();
+  constexpr int loads = 20;
+  const std::size_t before = mallinfo2().uordblks;
+  for (int k = 0; k < loads; ++k) load_and_run();
+  EXPECT_LT(mallinfo2().uordblks, before + loads * 1024);
 }
 
 TEST(Behaviour23Libraries, OnlyTheSystemsOwnAreNeeded) {
