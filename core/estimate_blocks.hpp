@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "aligned_vector.hpp"
-#include "communication_graph.hpp"
+#include "block_elimination.hpp"
 
 namespace mixed_order_game {
 
@@ -32,7 +32,13 @@ class EstimateBlocks {
   void find_pattern(const CommunicationGraph& graph);
   void find_modes(const CommunicationGraph& graph);
   [[nodiscard]] BlockPattern pattern() const {
-    return {players_, start_.data(), row_.data(), order_.data(), player_.data(), target_.data()};
+    return {players_,
+            elimination_.listed,
+            elimination_.start.data(),
+            elimination_.row.data(),
+            elimination_.order.data(),
+            player_.data(),
+            target_.data()};
   }
   [[nodiscard]] BlockModes modes() const {
     return {players_, dimension_ * players_, vector_.data(), eigenvalue_.data(), shared_.data()};
@@ -40,11 +46,10 @@ class EstimateBlocks {
 
   int players_ = 0;
   int dimension_ = 0;
+  Real factored_ = 0.0;  // gamma k3, or 0
   AlignedVector gain_;
   // by elimination
-  std::vector<int> start_;
-  std::vector<int> row_;
-  std::vector<int> order_;
+  BlockElimination elimination_;
   std::vector<int> player_;
   std::vector<int> target_;
   AlignedVector edge_;    // weight of each entry's edge; 0 where elimination fills in

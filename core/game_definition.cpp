@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <set>
 
+#include "block_elimination.hpp"
 #include "equilibrium.hpp"
 #include "errors.hpp"
 #include "families/polynomial_dynamics.hpp"
@@ -125,6 +126,7 @@ CommunicationGraph read_graph(const TomlEntry& table, int players) {
     throw GameError(edges.path() + " leaves the players in separate groups " + groups(components) +
                     ", expected a connected graph");
   }
+  require_moderate_factors(graph);
   return graph;
 }
 

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "block_elimination.hpp"
+
 namespace mixed_order_game {
 
 namespace {
@@ -363,6 +365,7 @@ void Instance::check_settings() {
     throw Error("the weights a[i,j] leave the players in separate groups " + groups(graph) +
                 ", expected a connected graph, or allow_disconnected = true");
   }
+  require_moderate_factors(graph);
   evaluation_.prepare_equilibrium(settings_);
 }
 

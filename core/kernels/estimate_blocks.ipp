@@ -8,7 +8,7 @@ void factor_blocks(BlockPattern pattern, double* lower, double* diagonal) {
     double* L = lower + lane;
     double* D = diagonal + lane;
     const int* target = pattern.target;
-    for (int k = 0; k < pattern.players; ++k) {
+    for (int k = 0; k < pattern.listed; ++k) {
       const Vector inverse = 1.0 / load(D + k * tile_length);
       store(inverse, D + k * tile_length);
       const int first = pattern.start[k];
@@ -26,6 +26,7 @@ void factor_blocks(BlockPattern pattern, double* lower, double* diagonal) {
         store(scaled, L + a * tile_length);
       }
     }
+    factor_full(full_players(pattern), full_entries(pattern, L), D + pattern.listed * tile_length);
   }
 }
 
@@ -35,7 +36,7 @@ inline void solve_columns(const BlockPattern& pattern, Index length, const doubl
                           double* x) {
   const int n = pattern.players;
   Width sum[count];
-  for (int k = 0; k < n; ++k) {
+  for (int k = 0; k < pattern.listed; ++k) {
     const double* from = x + pattern.order[k] * length;
     for (int h = 0; h < count; ++h) sum[h] = load_as<Width>(from + h * n);
     for (int a = pattern.start[k]; a < pattern.start[k + 1]; ++a) {
@@ -44,7 +45,8 @@ inline void solve_columns(const BlockPattern& pattern, Index length, const doubl
       for (int h = 0; h < count; ++h) store(load_as<Width>(to + h * n) - l * sum[h], to + h * n);
     }
   }
-  for (int k = n - 1; k >= 0; --k) {
+  solve_full<Width, count>(pattern, length, L, inverse, x);
+  for (int k = pattern.listed - 1; k >= 0; --k) {
     double* to = x + pattern.order[k] * length;
     const Width pivot = load_as<Width>(inverse + k * tile_length);
     for (int h = 0; h < count; ++h) sum[h] = load_as<Width>(to + h * n) * pivot;
@@ -59,7 +61,8 @@ inline void solve_columns(const BlockPattern& pattern, Index length, const doubl
 
 void solve_blocks(BlockPattern pattern, int width, const double* lower, const double* inverse_diagonal, double* rhs) {
   const Index n = pattern.players;
-  const Index entries = pattern.start[n];
+  const Index full = full_players(pattern);
+  const Index entries = pattern.start[pattern.listed] + full * (full - 1) / 2;
   for_columns(n, [=](auto lanes, Index j) {
     using Width = decltype(lanes);
     const Index tile = j / tile_length;

@@ -1,25 +1,41 @@
 // y_ij' = -k3 (sum_k a_ik (y_ij - y_kj) + a_ij (y_ij - xbar_j)); part of level.cpp.
 
+/// -k3 sum_k a_ik (y_ij - y_kj) of player i, for as many columns from p on as `count` vectors hold.
+template <typename Width, int count>
+inline void consensus_rates(NeighbourRows graph, int i, Index n, double k3, const double* y, double* rate, Index p) {
+  Width mine[count];
+  Width sum[count];
+  for (int c = 0; c < count; ++c) {
+    mine[c] = load_as<Width>(y + i * n + p + c * length_of<Width>);
+    sum[c] = Width{};
+  }
+  for (int e = graph.start[i]; e < graph.start[i + 1]; ++e) {
+    const double* other = y + graph.neighbour[e] * n + p;
+    for (int c = 0; c < count; ++c)
+      sum[c] += graph.weight[e] * (mine[c] - load_as<Width>(other + c * length_of<Width>));
+  }
+  for (int c = 0; c < count; ++c) store(-k3 * sum[c], rate + i * n + p + c * length_of<Width>);
+}
+
 void estimate_rates(int players, int dimension, NeighbourRows graph, double k3, const double* y, const double* xbar,
                     double* rate) {
+  constexpr int at_once = 4;  // sums that do not wait for each other
+  constexpr Index strip = at_once * vector_length;
   const Index n = static_cast<Index>(players) * dimension;
+  // of all players, so that a strip of y stays in the nearest caches
+  Index p = 0;
+  for (; p + strip <= n; p += strip) {
+    for (int i = 0; i < players; ++i) consensus_rates<Vector, at_once>(graph, i, n, k3, y, rate, p);
+  }
+  for_columns(n - p, [=](auto width, Index q) {
+    for (int i = 0; i < players; ++i) consensus_rates<decltype(width), 1>(graph, i, n, k3, y, rate, p + q);
+  });
   for (int i = 0; i < players; ++i) {
     const double* own = y + i * n;
     double* out = rate + i * n;
-    const int first = graph.start[i];
-    const int last = graph.start[i + 1];
-    for_columns(n, [=](auto width, Index p) {
-      using Width = decltype(width);
-      const Width mine = load_as<Width>(own + p);
-      Width sum = {};
-      for (int e = first; e < last; ++e) {
-        sum += graph.weight[e] * (mine - load_as<Width>(y + graph.neighbour[e] * n + p));
-      }
-      store(-k3 * sum, out + p);
-    });
-    for (int e = first; e < last; ++e) {
+    for (int e = graph.start[i]; e < graph.start[i + 1]; ++e) {
       const double gain = -k3 * graph.weight[e];
-      for (Index p = graph.neighbour[e]; p < n; p += players) out[p] += gain * (own[p] - xbar[p]);
+      for (Index j = graph.neighbour[e]; j < n; j += players) out[j] += gain * (own[j] - xbar[j]);
     }
   }
 }

@@ -15,17 +15,19 @@ struct NeighbourRows {
   const double* weight;
 };
 
-/// Pattern of the Cholesky factors of all estimate blocks; see EstimateBlocks. The blocks' numbers lie in tiles of
-/// eight blocks: entry a (or diagonal entry k) of block j at (j / 8 * entries + a) * 8 + j % 8.
+/// Pattern of the factors of all estimate blocks; see BlockElimination. The blocks' numbers lie in tiles of eight
+/// blocks: entry a (or diagonal entry k) of block j at (j / 8 * entries + a) * 8 + j % 8.
 struct BlockPattern {
   int players;
-  const int* start;   ///< column k of L: entries start[k] .. start[k + 1] - 1
+  int listed;         ///< columns of L before the full ones, whose number is a multiple of full_step
+  const int* start;   ///< column k < listed: entries start[k] .. start[k + 1] - 1; then those of the full columns
   const int* row;     ///< their rows, in elimination order
   const int* order;   ///< order[k] is the player eliminated k-th
   const int* player;  ///< order[row[a]] of each entry a
   const int* target;  ///< for each column the factor entries that its pairs of rows update, see factor_blocks
 };
 constexpr int tile_length = 8;
+constexpr int full_step = 4;
 
 /// All estimate blocks by their eigenvectors; see EstimateBlocks. Entries lie in rows of n = N D.
 struct BlockModes {

@@ -24,6 +24,7 @@ namespace {
 #include "rbf_network.ipp"
 #include "estimate_dynamics.ipp"
 #include "adaptation.ipp"
+#include "full_columns.ipp"
 #include "estimate_blocks.ipp"
 #include "estimate_modes.ipp"
 #include "dense_lu.ipp"

@@ -217,8 +217,33 @@ def scaling(context: Context) -> Result:
     result: Result = {"rows": rows, "exponent_20_to_100": float(exponent)}
     if 200 in sizes:
         result["exponent_100_to_200"] = float(np.log2(median[200] / median[100]))
+    result["complete"] = _complete_graph(context, cores[100])
     result["klu"] = _klu(context, cores[20])
     return result
+
+
+def _complete_graph(context: Context, sparse: Core) -> Result:
+    """The game of N = 100 with all players joined, in pairs with the family's own graph of degree four."""
+    players = 100
+    file = context.scratch / f"complete_{players}.toml"
+    file.write_text(scaling_game(players, complete=True))
+    core = Core(PROGRAMS / "core_run", file, sparse.stop, sparse.outputs)
+    exact = core.run(1e-10).trajectory
+    sparse_exact = sparse.run(1e-10).trajectory
+    pairs = []
+    for _ in range(2 if context.quick else 5):
+        near = sparse.run(1e-6)
+        run = core.run(1e-6)
+        pairs.append((run.median, near.median))
+    x = slice(exact.shape[1] // 2)
+    return {
+        "players": players,
+        "cpu": float(np.median([dense for dense, _ in pairs])),
+        "ratio": float(np.median([dense / near for dense, near in pairs])),
+        "peak_mb": run.peak_mb,
+        "error": float(np.max(np.abs(run.trajectory - exact)[:, x])),
+        "sparse_error": float(np.max(np.abs(near.trajectory - sparse_exact)[:, x])),
+    }
 
 
 def _klu(context: Context, core: Core) -> Result:

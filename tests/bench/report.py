@@ -135,7 +135,7 @@ def _scaling(result: Results) -> list[str]:
     text += f" ({_verdict(exponent, 2.2, at_least=False)})"
     if "exponent_100_to_200" in result:
         text += f"; from 100 to 200: {result['exponent_100_to_200']:.2f}"
-    klu = result["klu"]
+    complete, klu = result["complete"], result["klu"]
     own, told = klu["klu"], klu["klu-ordered"]
     return [
         "### Scaling",
@@ -148,6 +148,11 @@ def _scaling(result: Results) -> list[str]:
             rows,
         ),
         text + ".",
+        "",
+        f"All players joined at N = {complete['players']}: {_milliseconds(complete['cpu'])} ms,"
+        f" **{complete['ratio']:.1f} times** the graph of degree four"
+        f" ({_verdict(complete['ratio'], 5.0, at_least=False)}), and {complete['peak_mb']:.1f} MB;"
+        f" errors of x {complete['error']:.1e} and {complete['sparse_error']:.1e}.",
         "",
         f"KLU on the sparse Newton matrix in the same integrator at N = 20 over {klu['stop']:g} s:"
         f" {_milliseconds(own['cpu'])} ms with the better of its own orderings, **{own['ratio']:.0f} times**"

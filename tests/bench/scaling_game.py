@@ -1,7 +1,8 @@
 """The scaling family of games, for any number of players, as a game definition file.
 
 `python -m tests.bench.scaling_game 20 > twenty.toml`; half of the players are of order 2, the graph has
-degree four, and the consensus gain k3 grows with N so that the unperturbed loop stays stable.
+degree four or, with --complete, joins all players, and the consensus gain k3 grows with N so that the
+unperturbed loop stays stable.
 """
 
 from __future__ import annotations
@@ -13,12 +14,12 @@ import sys
 CENTERS = [-2.5 + 0.5 * m for m in range(11)]
 
 
-def scaling_game(players: int) -> str:
+def scaling_game(players: int, complete: bool = False) -> str:
     """The TOML text of the game with N players; indices run from 1 and are cyclic modulo N.
 
     f_i = q_i |x_i|^2 + q_i (x_i1 - x_i2) + |x_i - x_(i+1)|^2 + 0.5 |x_i - x_(i+7)|^2, q_i = 1 + (i-1) mod 5,
     g_i = 0.5 x_(i+1), d_il = (1 + (i-1) mod 3) sin((1 + (i-1) mod 4) t + l), x_il(0) = 5 sin(i + l),
-    edges (i, i+1) and (i, i + floor(N/3)). Raises ValueError for fewer than two players.
+    edges (i, i+1) and (i, i + floor(N/3)), or all. Raises ValueError for fewer than two players.
     """
     if players < 2:
         raise ValueError(f"at least 2 players expected, not {players}")
@@ -30,7 +31,7 @@ def scaling_game(players: int) -> str:
         {
             (min(i, j), max(i, j))
             for i in range(1, players + 1)
-            for j in (cyclic(i + 1), cyclic(i + players // 3))
+            for j in (range(1, players + 1) if complete else (cyclic(i + 1), cyclic(i + players // 3)))
             if i != j
         }
     )
@@ -81,7 +82,9 @@ def main() -> None:
     """Write the game with the given number of players to standard output."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("players", type=int)
-    sys.stdout.write(scaling_game(parser.parse_args().players))
+    parser.add_argument("--complete", action="store_true", help="join all players")
+    arguments = parser.parse_args()
+    sys.stdout.write(scaling_game(arguments.players, arguments.complete))
 
 
 if __name__ == "__main__":

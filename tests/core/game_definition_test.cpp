@@ -462,6 +462,24 @@ TEST(GameDefinition, NamesOnlySomeOfManySeparateGroups) {
   EXPECT_LT(message.size(), 320U);
 }
 
+TEST(GameDefinition, RefusesGraphsWhoseFactorsTakeTooMuchMemory) {
+  constexpr int players = 1000;
+  std::string edges = "edges = [";
+  for (int i = 1; i <= players; ++i) {
+    for (int span = 1; span <= players / 2; span += span < 10 ? 3 : 31) {
+      edges += '[' + std::to_string(i) + ',' + std::to_string((i + span - 1) % players + 1) + "],";
+    }
+  }
+  std::string text = ring_of(players, 1);
+  const std::size_t ring = text.find("edges = ");
+  text.replace(ring, text.find('\n', ring) - ring, edges + ']');
+  const std::string message = refusal(text);
+  EXPECT_EQ(message.find("the graph of 1000 players and "), 0U) << message;
+  EXPECT_NE(message.find(" bytes for factors of the estimates' equations, expected at most 2147483648"),
+            std::string::npos)
+      << message;
+}
+
 std::string repeated(std::string_view part, std::size_t times) {
   std::string text;
   text.reserve(part.size() * times);

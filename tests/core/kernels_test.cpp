@@ -7,6 +7,7 @@
 #include <limits>
 #include <memory>
 
+#include "block_elimination.hpp"
 #include "random_game.hpp"
 
 namespace mixed_order_game {
@@ -461,39 +462,43 @@ TEST(SharedSignal, IsAddedToTheEstimateOfItsPlayer) {
 
 // --- Newton solver ---
 
-/// Blocks with a full pattern, eliminated in reversed order of players.
+/// Blocks with a full pattern, eliminated in reversed order of players; the first columns are listed all the same.
 struct FullPattern {
-  int players;
-  std::vector<int> start{0}, row, order, player, target;
+  BlockElimination elimination;
+  std::vector<int> player, target;
 
-  explicit FullPattern(int n) : players(n) {
-    for (int k = 0; k < n; ++k) {
-      order.push_back(n - 1 - k);
+  FullPattern(int n, int listed) {
+    elimination.listed = listed;
+    elimination.start.push_back(0);
+    for (int k = 0; k < n; ++k) elimination.order.push_back(n - 1 - k);
+    for (int k = 0; k < listed; ++k) {
       for (int i = k + 1; i < n; ++i) {
-        row.push_back(i);
+        elimination.row.push_back(i);
         player.push_back(n - 1 - i);
       }
-      start.push_back(static_cast<int>(row.size()));
+      elimination.start.push_back(static_cast<int>(elimination.row.size()));
     }
-    for (int k = 0; k < n; ++k) {
-      for (int a = k + 1; a < n; ++a) {
-        for (int b = k + 1; b < a; ++b) target.push_back(entry(a, b));
-      }
-    }
+    target = elimination.targets();
   }
   /// Of row i and column k < i.
-  [[nodiscard]] int entry(int i, int k) const { return start[static_cast<std::size_t>(k)] + i - k - 1; }
-  [[nodiscard]] int entries() const { return static_cast<int>(row.size()); }
+  [[nodiscard]] int entry(int i, int k) const {
+    if (k >= elimination.listed) return elimination.full_entry(i, k);
+    return elimination.start[static_cast<std::size_t>(k)] + i - k - 1;
+  }
+  [[nodiscard]] int entries() const { return elimination.entries(); }
   [[nodiscard]] BlockPattern pattern() const {
-    return {players, start.data(), row.data(), order.data(), player.data(), target.data()};
+    return {elimination.players(),  elimination.listed,       elimination.start.data(),
+            elimination.row.data(), elimination.order.data(), player.data(),
+            target.data()};
   }
 };
 
 TEST(Blocks, AreFactoredAndSolvedSideBySide) {
   RandomNumbers random(11);
-  for (const int n : {2, 3, 5, 8, 9, 13, 20}) {
+  for (const auto& [n, listed] :
+       {std::pair{2, 2}, {3, 3}, {5, 1}, {8, 0}, {9, 9}, {13, 5}, {13, 1}, {20, 20}, {28, 4}}) {
     for (const int width : {1, 2, 3}) {
-      const FullPattern full(n);
+      const FullPattern full(n, listed);
       const int tiles = (n + tile_length - 1) / tile_length;
       const auto place = [](int number, int of, int j) {
         return (j / tile_length * of + number) * tile_length + j % tile_length;
@@ -513,7 +518,7 @@ TEST(Blocks, AreFactoredAndSolvedSideBySide) {
         return x;
       });
       const auto of_player = [&](const Array& rows, int k, int h, int j) {  // unknown eliminated k-th
-        return rows[full.order[static_cast<std::size_t>(k)] * width * n + h * n + j];
+        return rows[full.elimination.order[static_cast<std::size_t>(k)] * width * n + h * n + j];
       };
       for (int j = 0; j < n; ++j) {
         for (int h = 0; h < width; ++h) {

@@ -101,16 +101,17 @@ INSTANTIATE_TEST_SUITE_P(
 
 class StructuredNewtonOnGraphs : public ::testing::TestWithParam<std::size_t> {};
 
-TEST_P(StructuredNewtonOnGraphs, StarPathRingAndCompleteGraph) {
+TEST_P(StructuredNewtonOnGraphs, FromStarToCompleteGraph) {
   const std::size_t N = GetParam();
   PlainGame game = random_game({.seed = 21, .players = N, .dimension = 2, .neurons = 3});
   const auto linked = [N](const std::string& kind, std::size_t i, std::size_t j) {  // i < j
     if (kind == "star") return i == 0;
     if (kind == "path") return j == i + 1;
     if (kind == "ring") return j == i + 1 || (i == 0 && j == N - 1);
+    if (kind == "clique with a tail") return j == i + 1 || j < 2 * N / 3;
     return true;
   };
-  for (const std::string kind : {"star", "path", "ring", "complete"}) {
+  for (const std::string kind : {"star", "path", "ring", "clique with a tail", "complete"}) {
     for (std::size_t i = 0; i < N; ++i) {
       for (std::size_t j = i + 1; j < N; ++j) {
         game.adjacency[i][j] = game.adjacency[j][i] = linked(kind, i, j) ? 0.5 + 0.1 * static_cast<Real>(i + j) : 0.0;
@@ -123,14 +124,25 @@ TEST_P(StructuredNewtonOnGraphs, StarPathRingAndCompleteGraph) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(ByModesAndByElimination, StructuredNewtonOnGraphs, ::testing::Values(11, 18));
+INSTANTIATE_TEST_SUITE_P(ByModesAndByElimination, StructuredNewtonOnGraphs, ::testing::Values(7, 11, 18));
 
 TEST(StructuredNewtonRefresh, FollowsNewEdgesAndCouplings) {
   const PlainGame before = random_game({.seed = 31, .players = 5, .dimension = 2, .neurons = 3});
   ClosedLoop loop(parse_game(toml_of(before)).parameters);
   LoopJacobian jacobian(loop);
   const auto structured = make_structured_newton();
+  Signals signals(loop.shape());
+  std::vector<Real> state(at(loop.layout().size()), 0.5);
+  std::vector<Real> rate(state.size());
+  const Modes modes(10, 0);
+  const std::vector<Real> d_ext(10, 0.0);
+  const auto linearize = [&] {
+    loop.evaluate(0.0, state.data(), d_ext.data(), modes, signals, rate.data());
+    jacobian.linearize(state.data(), signals, modes);
+  };
+  linearize();
   structured->refresh(jacobian);
+  ASSERT_TRUE(structured->factor(jacobian, 2e-3));
   for (int i = 0; i < 5; ++i) {
     for (int j = 0; j < i; ++j) {
       loop.parameters().graph.set_weight(i, j, 0.7);
@@ -141,13 +153,7 @@ TEST(StructuredNewtonRefresh, FollowsNewEdgesAndCouplings) {
   jacobian.refresh();
   structured->refresh(jacobian);
   const auto dense = make_dense_newton();
-  Signals signals(loop.shape());
-  std::vector<Real> state(at(loop.layout().size()), 0.5);
-  std::vector<Real> rate(state.size());
-  const Modes modes(10, 0);
-  const std::vector<Real> d_ext(10, 0.0);
-  loop.evaluate(0.0, state.data(), d_ext.data(), modes, signals, rate.data());
-  jacobian.linearize(state.data(), signals, modes);
+  linearize();
   ASSERT_TRUE(structured->factor(jacobian, 2e-3));
   ASSERT_TRUE(dense->factor(jacobian, 2e-3));
   std::vector<Real> expected = rate;
