@@ -128,34 +128,45 @@ void ClosedLoop::weight_norms(const Real* state, Real* norm2) const {
   kernels().column_products(shape().actions(), shape().neurons, W, W, norm2);
 }
 
-void ClosedLoop::resolve_modes(const Real* norm2, const Signals& signals, Modes& modes) const {
-  for (std::size_t p = 0; p < modes.size(); ++p) {
-    const bool reached = modes[p] != 0 || norm2[p] >= parameters_.rbf.W_max;
-    const bool outward = signals.error[p] * signals.network[p] >= 0.0;
-    modes[p] = parameters_.strategy.robust && reached && outward ? 1 : 0;
-  }
-}
-
-void ClosedLoop::event_functions(const Real* state, const Modes& modes, Signals& signals, Real* values) const {
-  constexpr Real hysteresis = 1e-12;
+void ClosedLoop::event_functions(const Real* state, const Modes& modes, Real tolerance, Signals& signals,
+                                 Real* values) const {
   constexpr Real almost_zero = 1e-100;  // integrators stop watching a function that begins at zero
   if (!parameters_.strategy.robust) {
     std::fill_n(values, modes.size(), -1.0);
     return;
   }
+  const Real W_max = parameters_.rbf.W_max;
+  const Real beta = parameters_.gains.beta;
   weight_norms(state, values);
   if (std::any_of(modes.begin(), modes.end(), [](auto mode) { return mode != 0; })) {
     evaluate_errors(state, signals);
     evaluate_network(state, signals);
   }
   for (std::size_t p = 0; p < modes.size(); ++p) {
-    const Real value =
-        modes[p] != 0 ? -signals.error[p] * signals.network[p] : values[p] / parameters_.rbf.W_max - 1.0 - hysteresis;
+    const Real height = values[p] / W_max - 1.0;
+    const Real rate = 2.0 * beta * signals.error[p] * signals.network[p] / W_max;  // of w'w / W_max, inside
+    const Real value = modes[p] == 0 ? height : std::min(-tolerance - height, -rate);
     values[p] = value == 0.0 ? -almost_zero : value;
   }
 }
 
-void ClosedLoop::project(const Modes& modes, Real* state) const {
+int ClosedLoop::resolve_modes(const Real* state, Real tolerance, Signals& signals, Modes& modes) const {
+  AlignedVector values(modes.size());
+  event_functions(state, modes, tolerance, signals, values.data());
+  int changed = 0;
+  for (std::size_t p = 0; p < modes.size(); ++p) {
+    if (!(values[p] > 0.0)) continue;
+    modes[p] = modes[p] == 0 ? 1 : 0;
+    ++changed;
+  }
+  return changed;
+}
+
+void ClosedLoop::project(const Modes& modes, Signals& signals, Real* state) const {
+  if (std::any_of(modes.begin(), modes.end(), [](auto mode) { return mode != 0; })) {
+    evaluate_errors(state, signals);
+    evaluate_network(state, signals);
+  }
   const Real W_max = parameters_.rbf.W_max;
   for (int p = 0; p < shape().actions(); ++p) {
     Real norm2 = 0.0;
@@ -163,10 +174,10 @@ void ClosedLoop::project(const Modes& modes, Real* state) const {
       const Real w = state[layout_.weights_of(m) + p];
       norm2 += w * w;
     }
-    if (norm2 > W_max || (modes[at(p)] != 0 && norm2 > 0.0)) {
-      const Real factor = std::sqrt(W_max / norm2);
-      for (int m = 0; m < shape().neurons; ++m) state[layout_.weights_of(m) + p] *= factor;
-    }
+    const bool slides = modes[at(p)] != 0 && norm2 > 0.0 && signals.error[at(p)] * signals.network[at(p)] >= 0.0;
+    if (!(norm2 > W_max || slides)) continue;
+    const Real factor = std::sqrt(W_max / norm2);
+    for (int m = 0; m < shape().neurons; ++m) state[layout_.weights_of(m) + p] *= factor;
   }
 }
 

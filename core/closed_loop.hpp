@@ -57,18 +57,20 @@ class ClosedLoop {
   /// w'w of each weight column, at entry(i, l).
   void weight_norms(const Real* state, Real* norm2) const;
 
-  /// Which mode each column has from here on: on the sphere if it is there, or has reached it with w'w >= W_max, and
-  /// e w'S >= 0. Signals and norms w'w as of this state.
-  void resolve_modes(const Real* norm2, const Signals& signals, Modes& modes) const;
-
   /// One event function for each column, at entry(i, l), which rises through zero where the column's mode ends: inside,
-  /// w'w / W_max - 1 (less a hysteresis of rounding size, so that a column that has just left the sphere is not seen to
-  /// return); on the sphere, -e w'S. Never exactly zero. Evaluates errors and network when a column is on the sphere.
-  void event_functions(const Real* state, const Modes& modes, Signals& signals, Real* values) const;
+  /// w'w / W_max - 1; on the sphere, where both 1 - tolerance - w'w / W_max and the rate -2 beta e w'S / W_max at which
+  /// w'w falls are positive, the lesser of the two. The sign of e alone is noise where e is below the integrator's
+  /// tolerance; that a column has left is certain once w'w has fallen by as much, and until then its rates are those
+  /// inside anyway. Never exactly zero. Evaluates errors and network when a column is on the sphere.
+  void event_functions(const Real* state, const Modes& modes, Real tolerance, Signals& signals, Real* values) const;
 
-  /// Puts the state where the modes say it is: columns on the sphere are scaled to w'w = W_max, and columns inside
-  /// that lie above the bound are scaled back to it.
-  void project(const Modes& modes, Real* state) const;
+  /// Gives the columns whose event functions are positive the other mode. Returns how many there were.
+  int resolve_modes(const Real* state, Real tolerance, Signals& signals, Modes& modes) const;
+
+  /// Scales columns above the bound back to it, and those on the sphere, where drift has taken them below, up to it.
+  /// But where e w'S < 0 a column on the sphere is on its way inward and stays below. Evaluates errors and network when
+  /// a column is on the sphere.
+  void project(const Modes& modes, Signals& signals, Real* state) const;
 
  private:
   Parameters parameters_;

@@ -1,10 +1,8 @@
 #include "integrator.hpp"
 
 #include <cvode/cvode.h>
-#include <nvector/nvector_serial.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <cstdlib>
 #include <cstring>
@@ -13,6 +11,7 @@
 #include <utility>
 
 #include "errors.hpp"
+#include "failure.hpp"
 #include "kernels/kernels.hpp"
 #include "robust_layer.hpp"
 #include "sundials_handles.hpp"
@@ -26,12 +25,6 @@ struct FreeCvode {
   void operator()(void* memory) const { CVodeFree(&memory); }
 };
 using Cvode = std::unique_ptr<void, FreeCvode>;
-
-std::string in_seconds(Real t, int digits = 9) {
-  char text[32];
-  const auto [end, error] = std::to_chars(text, text + sizeof text, t, std::chars_format::general, digits);
-  return std::string(text, end) + " s";
-}
 
 }  // namespace
 
@@ -58,8 +51,10 @@ class Integrator::Implementation final : NewtonSystem {
   void present(Real t);
   void interpolate(Real t, Real* state);
   void settle(Real* state);
+  void require_usable_rates(Real t, const Real* state);
   [[noreturn]] void fail(int flag, Real t);
-  [[nodiscard]] std::string absolute(Real t) const { return in_seconds(loop_.time_origin() + t, 15); }
+  [[noreturn]] void stop(Real t, const Real* state, const std::string& reason);
+  [[nodiscard]] std::string absolute(Real t) const { return number_text(loop_.time_origin() + t, 15) + " s"; }
 
   // CVODE's callbacks
   int rate(Real t, const Real* state, Real* rate) noexcept override;
@@ -68,7 +63,7 @@ class Integrator::Implementation final : NewtonSystem {
   int newton_matrix(const Real* state, Real gamma) noexcept;
   int solve(Real* b) noexcept override;
   bool linearization_holds(const Real* state, Real gamma, const Real* weight, Real tolerance) noexcept override;
-  bool move_start(const Real* failed, Real* predicted) noexcept override;
+  bool stop_correction(Real* state) noexcept override;
 
   template <typename Action>
   int guarded(Action action) noexcept {
@@ -118,7 +113,6 @@ class Integrator::Implementation final : NewtonSystem {
   std::int64_t newton_setups_ = 0;
   std::int64_t newton_solves_ = 0;
   std::exception_ptr failure_;
-  std::string message_;
 
   ContextHandle context_;
   VectorHandle vector_;
@@ -167,11 +161,8 @@ Integrator::Implementation::Implementation(const ClosedLoop& loop, const Externa
   cvode_.reset(CVodeCreate(CV_BDF, context_.get()));
   if (cvode_ == nullptr) throw std::bad_alloc();
   void* memory = cvode_.get();
-  message_.reserve(256);  // as the library's own array; its handler must not throw
-#if SUNDIALS_VERSION_MAJOR < 7
-  CVodeSetErrHandlerFn(
-      memory, [](int, const char*, const char*, char* text, void* self) { static_cast<Self>(self)->message_ = text; },
-      this);
+#if SUNDIALS_VERSION_MAJOR < 7  // which print errors
+  CVodeSetErrHandlerFn(memory, [](int, const char*, const char*, char*, void*) {}, nullptr);
 #endif
   CVodeSetUserData(memory, this);
   const auto require = [](int flag, const char* call) {
@@ -181,7 +172,7 @@ Integrator::Implementation::Implementation(const ClosedLoop& loop, const Externa
   const int initialized = CVodeInit(
       memory,
       [](SunReal t, N_Vector y, N_Vector rate, void* self) {
-        return static_cast<Self>(self)->finite_rate(t, NV_DATA_S(y), NV_DATA_S(rate));
+        return static_cast<Self>(self)->finite_rate(t, N_VGetArrayPointer(y), N_VGetArrayPointer(rate));
       },
       0.0, vector_.get());
   if (initialized == CV_MEM_FAIL)
@@ -190,8 +181,9 @@ Integrator::Implementation::Implementation(const ClosedLoop& loop, const Externa
   require(CVodeWFtolerances(memory,
                             [](N_Vector y, N_Vector weight, void* self) {
                               const Tolerances& tolerances = static_cast<Self>(self)->tolerances_;
-                              kernels().error_weights(NV_LENGTH_S(y), tolerances.relative, tolerances.absolute,
-                                                      NV_DATA_S(y), NV_DATA_S(weight));
+                              kernels().error_weights(static_cast<Self>(self)->size_, tolerances.relative,
+                                                      tolerances.absolute, N_VGetArrayPointer(y),
+                                                      N_VGetArrayPointer(weight));
                               return 0;
                             }),
           "CVodeWFtolerances");
@@ -200,14 +192,14 @@ Integrator::Implementation::Implementation(const ClosedLoop& loop, const Externa
                            [](SunReal, N_Vector y, N_Vector, SUNMatrix, SunBoolean, SunBoolean* is_current,
                               SunReal gamma, void* self, N_Vector, N_Vector, N_Vector) {
                              *is_current = SUNTRUE;
-                             return static_cast<Self>(self)->newton_matrix(NV_DATA_S(y), gamma);
+                             return static_cast<Self>(self)->newton_matrix(N_VGetArrayPointer(y), gamma);
                            }),
           "CVodeSetLinSysFn");
   require(CVodeSetNonlinearSolver(memory, iteration_.handle()), "CVodeSetNonlinearSolver");
   const int columns = loop.shape().actions();
   require(CVodeRootInit(memory, columns,
                         [](SunReal, N_Vector y, SunReal* values, void* self) {
-                          return static_cast<Self>(self)->event_functions(NV_DATA_S(y), values);
+                          return static_cast<Self>(self)->event_functions(N_VGetArrayPointer(y), values);
                         }),
           "CVodeRootInit");
   std::vector<int> rising(at(columns), 1);
@@ -221,6 +213,9 @@ Integrator::Implementation::Implementation(const ClosedLoop& loop, const Externa
   CVodeSetLSetupFrequency(memory, 5);
   CVodeSetDeltaGammaMaxLSetup(memory, 0.05);
   CVodeSetEtaFixedStepBounds(memory, 0.0, 1.1);
+  // where a layer or a sphere is met, a step may have to shrink by many powers of ten
+  CVodeSetMaxErrTestFails(memory, 50);
+  CVodeSetMaxConvFails(memory, 50);
 }
 
 int Integrator::Implementation::rate(Real t, const Real* state, Real* rate) noexcept {
@@ -239,7 +234,7 @@ int Integrator::Implementation::finite_rate(Real t, const Real* state, Real* rat
 
 int Integrator::Implementation::event_functions(const Real* state, Real* values) noexcept {
   return guarded([&] {
-    loop_.event_functions(state, modes_, signals_, values);
+    loop_.event_functions(state, modes_, tolerances_.relative, signals_, values);
     std::copy_n(values, event_values_.size(), event_values_.begin());
     return 0;
   });
@@ -260,8 +255,8 @@ bool Integrator::Implementation::linearization_holds(const Real* state, Real gam
   return layer_.linearization_holds(jacobian_, signals_, state, gamma, weight, tolerance);
 }
 
-bool Integrator::Implementation::move_start(const Real* failed, Real* predicted) noexcept {
-  return layer_.move_to_middle(signals_, failed, predicted);
+bool Integrator::Implementation::stop_correction(Real* state) noexcept {
+  return layer_.stop_in_the_middle(signals_, state);
 }
 
 int Integrator::Implementation::solve(Real* b) noexcept {
@@ -272,16 +267,48 @@ int Integrator::Implementation::solve(Real* b) noexcept {
   });
 }
 
+void Integrator::Implementation::stop(Real t, const Real* state, const std::string& reason) {
+  const std::string growth = unbounded_growth(loop_, state);
+  throw IntegrationError("the integration stopped at t = " + absolute(t) + ": " + (growth.empty() ? reason : growth));
+}
+
+void Integrator::Implementation::require_usable_rates(Real t, const Real* state) {
+  const int result = finite_rate(t, state, rate_.data());
+  if (failure_) std::rethrow_exception(std::exchange(failure_, nullptr));
+  if (result != 0) stop(t, state, unusable_rate(loop_, d_ext_.data(), signals_, rate_.data()));
+}
+
+/// CVODE has left the state at time t in its vector.
 void Integrator::Implementation::fail(int flag, Real t) {
   if (failure_) std::rethrow_exception(std::exchange(failure_, nullptr));
-  std::unique_ptr<char, decltype(&std::free)> name(CVodeGetReturnFlagName(flag), &std::free);
-  throw IntegrationError("the integration stopped at t = " + absolute(t) + ": " +
-                         (message_.empty() ? std::string(name.get()) : message_));
+  const Real* state = N_VGetArrayPointer(vector_.get());
+  Real step = 0.0;
+  CVodeGetCurrentStep(cvode_.get(), &step);
+  const std::string last_step = ", at last with a step of " + number_text(step) + " s";
+  switch (flag) {
+    case CV_TOO_MUCH_ACC:
+      stop(t, state, "double precision cannot meet the relative tolerance " + number_text(tolerances_.relative));
+    case CV_ERR_FAILURE:
+      stop(t, state, "the error test failed again and again" + last_step);
+    case CV_CONV_FAILURE:
+    case CV_LSETUP_FAIL:
+    case CV_LSOLVE_FAIL:
+      stop(t, state, "no solution was found for the equations of an implicit step" + last_step);
+    case CV_RHSFUNC_FAIL:
+    case CV_FIRST_RHSFUNC_ERR:
+    case CV_REPTD_RHSFUNC_ERR:
+    case CV_UNREC_RHSFUNC_ERR:
+      require_usable_rates(t, state);
+      stop(t, state, "the rates are not finite just after it" + last_step);
+    default:
+      std::unique_ptr<char, decltype(&std::free)> name(CVodeGetReturnFlagName(flag), &std::free);
+      stop(t, state, name.get());
+  }
 }
 
 /// Makes CVODE begin at the restart point, as a new solver would.
 void Integrator::Implementation::begin_at_restart_point() {
-  std::copy(restart_state_.begin(), restart_state_.end(), NV_DATA_S(vector_.get()));
+  std::copy(restart_state_.begin(), restart_state_.end(), N_VGetArrayPointer(vector_.get()));
   modes_ = restart_modes_;
   steps_since_restart_ = 0;
   event_pending_ = false;
@@ -289,7 +316,6 @@ void Integrator::Implementation::begin_at_restart_point() {
   events_ = restart_statistics_.events;
   newton_setups_ = restart_statistics_.newton_setups;
   newton_solves_ = restart_statistics_.newton_solves;
-  message_.clear();
   iteration_.reset();
   const int flag = CVodeReInit(cvode_.get(), restart_time_, vector_.get());
   if (flag < 0) fail(flag, restart_time_);
@@ -302,7 +328,7 @@ void Integrator::Implementation::settle(Real* state) {
   for (const Real norm2 : norm2_) {
     largest_raw_excess_ = std::max(largest_raw_excess_, norm2 / loop_.parameters().rbf.W_max - 1.0);
   }
-  loop_.project(modes_, state);
+  loop_.project(modes_, signals_, state);
 }
 
 void Integrator::Implementation::start(Real t, Tolerances tolerances) {
@@ -318,9 +344,8 @@ void Integrator::Implementation::start(Real t, Tolerances tolerances) {
   events_ = newton_setups_ = newton_solves_ = 0;
   jacobian_.refresh();
   newton_->refresh(jacobian_);
-  if (finite_rate(t, state_.data(), rate_.data()) != 0) fail(CV_RHSFUNC_FAIL, t);
-  loop_.weight_norms(state_.data(), norm2_.data());
-  loop_.resolve_modes(norm2_.data(), signals_, modes_);
+  require_usable_rates(t, state_.data());
+  loop_.resolve_modes(state_.data(), tolerances_.relative, signals_, modes_);
   restart_state_ = state_;
   restart_modes_ = modes_;
   begin_at_restart_point();
@@ -332,10 +357,8 @@ void Integrator::Implementation::restart(bool parameters_changed) {
     jacobian_.refresh();
     newton_->refresh(jacobian_);
   }
-  if (finite_rate(time_, state_.data(), rate_.data()) != 0) fail(CV_RHSFUNC_FAIL, time_);
-  loop_.weight_norms(state_.data(), norm2_.data());
-  // a column on the sphere lies there to rounding; only its direction can have changed
-  loop_.resolve_modes(norm2_.data(), signals_, modes_);
+  require_usable_rates(time_, state_.data());
+  loop_.resolve_modes(state_.data(), tolerances_.relative, signals_, modes_);
   restart_time_ = time_;
   restart_state_ = state_;
   restart_modes_ = modes_;
@@ -347,11 +370,12 @@ void Integrator::Implementation::take_step() {
   // CVODE derives its first step from the distance to the output time, so that must not depend on the caller
   const Real horizon = restart_time_ + std::max(1.0, 1e-3 * std::fabs(restart_time_));
   const int flag = CVode(cvode_.get(), horizon, vector_.get(), &internal_time_, CV_ONE_STEP);
-  if (flag < 0) fail(flag, before);
+  if (flag < 0) fail(flag, internal_time_);
   ++steps_since_restart_;
   if (!(internal_time_ > before)) {
-    throw IntegrationError("the integration stopped at t = " + absolute(before) +
-                           ": the step size fell below the resolution of time");
+    stop(before, N_VGetArrayPointer(vector_.get()),
+         "the steps that the relative tolerance " + number_text(tolerances_.relative) +
+             " asks for fell below the resolution of time");
   }
   std::fill(event_columns_.begin(), event_columns_.end(), 0);
   if (flag == CV_ROOT_RETURN) {
@@ -381,23 +405,20 @@ void Integrator::Implementation::take_step() {
 bool Integrator::Implementation::handle_event() {
   event_pending_ = false;
   const Real t = event_time_;
-  Real* state = NV_DATA_S(vector_.get());
+  Real* state = N_VGetArrayPointer(vector_.get());
   interpolate(t, state);
   settle(state);
   loop_.evaluate_seeking(state, signals_);
   bool restarts = steps_since_restart_ >= most_steps_between_restarts_;
   for (std::size_t p = 0; p < modes_.size(); ++p) {
     if (event_columns_[p] == 0) continue;
-    const bool outward = signals_.error[p] * signals_.network[p] >= 0.0;
-    const std::uint8_t mode = modes_[p] == 0 && outward ? 1 : 0;
-    if (mode == modes_[p]) continue;
-    modes_[p] = mode;
+    modes_[p] = modes_[p] == 0 ? 1 : 0;
     ++events_;
-    restarts = restarts || mode != 0;
+    restarts = restarts || (modes_[p] != 0 && signals_.error[p] * signals_.network[p] >= 0.0);
   }
   if (!restarts) return false;
   restart_statistics_ = statistics();
-  loop_.project(modes_, state);
+  loop_.project(modes_, signals_, state);
   std::copy_n(state, size_, restart_state_.begin());
   restart_time_ = t;
   restart_modes_ = modes_;
@@ -412,7 +433,7 @@ void Integrator::Implementation::interpolate(Real t, Real* state) {
   }
   const int flag = CVodeGetDky(cvode_.get(), t, 0, vector_.get());
   if (flag < 0) fail(flag, t);
-  if (state != NV_DATA_S(vector_.get())) std::copy_n(NV_DATA_S(vector_.get()), size_, state);
+  if (state != N_VGetArrayPointer(vector_.get())) std::copy_n(N_VGetArrayPointer(vector_.get()), size_, state);
 }
 
 void Integrator::Implementation::present(Real t) {
@@ -426,6 +447,7 @@ void Integrator::Implementation::advance(Real t_end) {
   constexpr int patience = 20'000;
   const Real least_progress = 1e-5 * (t_end - time_);
   Real mark = internal_time_;
+  std::int64_t events = events_;
   int steps = 0;
   while (true) {
     if (event_pending_ && event_time_ <= t_end) {
@@ -436,10 +458,11 @@ void Integrator::Implementation::advance(Real t_end) {
       take_step();
       if (++steps < patience) continue;
       if (!(internal_time_ - mark >= least_progress)) {
-        throw IntegrationError("the integration stopped at t = " + absolute(internal_time_) + ": " +
-                               std::to_string(patience) + " steps advanced it by " + in_seconds(internal_time_ - mark) +
-                               ", which is no progress towards " + absolute(t_end));
+        stop(internal_time_, N_VGetArrayPointer(vector_.get()),
+             std::to_string(patience) + " steps with " + std::to_string(events_ - events) + " events advanced it by " +
+                 number_text(internal_time_ - mark) + " s, which is no progress towards " + absolute(t_end));
       }
+      events = events_;
       mark = internal_time_;
       steps = 0;
     }

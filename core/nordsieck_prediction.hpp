@@ -1,6 +1,6 @@
 // CVODE predicts a step by scaling the columns z_1 .. z_q of its Nordsieck array (when the step size has changed) and
-// by q (q + 1) / 2 additions z_{j-1} = z_{j-1} + z_j, each a pass over memory. Kept back until another operation
-// follows, they are made in one pass, in registers, with the same result to the bit.
+// by q (q + 1) / 2 additions z_{j-1} = z_{j-1} + z_j, each a pass over memory. Kept back until another operation or a
+// look at the data follows, they are made in one pass, in registers, with the same result to the bit.
 #pragma once
 
 #include <array>

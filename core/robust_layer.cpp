@@ -5,8 +5,18 @@
 
 namespace mixed_order_game {
 
+namespace {
+
+// A defect that is a part of phi's range, rather than a small one, changes sign as the iteration happens to end on this
+// or that side of a bend. From step to step that is noise, of which the error test sees high derivatives: the run then
+// stands still at the step whose defects are just let through. So such a defect counts this much more, in parts of
+// delta.
+constexpr Real weight_of_bends = 20.0;
+
+}  // namespace
+
 RobustLayer::RobustLayer(const ClosedLoop& loop)
-    : loop_(loop), trial_(loop.shape()), failed_(at(loop.shape().actions())) {
+    : loop_(loop), trial_(loop.shape()), weight_(at(loop.shape().actions())) {
   const Shape& shape = loop.shape();
   for (int p = 0; p < shape.actions(); ++p) {
     const bool second = shape.is_second_order(shape.player_of(p));
@@ -14,14 +24,31 @@ RobustLayer::RobustLayer(const ClosedLoop& loop)
   }
 }
 
+/// The largest weight with which a change of e enters the solution of a step: by itself, and by w' = beta S e.
+void RobustLayer::find_weights(const LoopJacobian& jacobian, Real gamma, const Real* weight) {
+  const StateLayout& layout = loop_.layout();
+  const std::size_t columns = place_.size();
+  std::fill(weight_.begin(), weight_.end(), 0.0);
+  for (int m = 0; m < loop_.shape().neurons; ++m) {
+    const Real* activation = jacobian.activation.data() + at(m) * columns;
+    const Real* weight_of_w = weight + layout.weights_of(m);
+    for (std::size_t p = 0; p < columns; ++p) weight_[p] = std::max(weight_[p], activation[p] * weight_of_w[p]);
+  }
+  const Real beta = loop_.parameters().gains.beta;
+  for (std::size_t p = 0; p < columns; ++p) weight_[p] = std::max(weight[place_[p]], gamma * beta * weight_[p]);
+}
+
 bool RobustLayer::linearization_holds(const LoopJacobian& jacobian, const Signals& signals, const Real* state,
                                       Real gamma, const Real* weight, Real tolerance) {
   if (!loop_.parameters().strategy.robust) return true;
   const Gains& gains = loop_.parameters().gains;
+  if (gains.delta == 0.0) return true;
   const Real sharpness = robust_term_constant * gains.delta / gains.epsilon;
   const std::size_t columns = place_.size();
   loop_.evaluate_errors(state, trial_);
+  find_weights(jacobian, gamma, weight);
   const auto change = [&](std::size_t p) { return trial_.error[p] - signals.error[p]; };
+  const auto counted = [&](Real defect) { return defect * (1.0 + weight_of_bends / gains.delta * defect); };
 
   // A bound is nearly always enough, and needs no tanh: Taylor's remainder and the slope's change since the
   // factorization, with |phi''| <= 4 / (3 sqrt 3) delta (K delta / epsilon)^2.
@@ -30,38 +57,36 @@ bool RobustLayer::linearization_holds(const LoopJacobian& jacobian, const Signal
   for (std::size_t p = 0; p < columns; ++p) {
     const Real size = std::fabs(change(p));
     const Real slope = loop_.robust_term_slope(signals.robust[p]);
-    const Real difference = (0.5 * largest_curvature * size + std::fabs(slope - jacobian.slope[p])) * size;
-    bound = std::max(bound, difference * weight[place_[p]]);
+    const Real defect = (0.5 * largest_curvature * size + std::fabs(slope - jacobian.slope[p])) * size;
+    bound = std::max(bound, counted(defect) * weight_[p]);
   }
   if (gamma * bound <= tolerance) return true;
 
   loop_.evaluate_robust_term(trial_);
-  // A difference in phi moves the solution by its share gamma / (1 + gamma slope).
+  // A defect of phi moves the solution by its share gamma / (1 + gamma slope).
   Real largest = 0.0;
   for (std::size_t p = 0; p < columns; ++p) {
-    const Real difference = trial_.robust[p] - (signals.robust[p] + jacobian.slope[p] * change(p));
+    const Real defect = std::fabs(trial_.robust[p] - (signals.robust[p] + jacobian.slope[p] * change(p)));
     const Real slope = std::min(loop_.robust_term_slope(trial_.robust[p]), jacobian.slope[p]);
-    largest = std::max(largest, gamma / (1.0 + gamma * slope) * std::fabs(difference) * weight[place_[p]]);
+    largest = std::max(largest, gamma / (1.0 + gamma * slope) * counted(defect) * weight_[p]);
   }
   return largest <= tolerance;
 }
 
-bool RobustLayer::move_to_middle(const Signals& signals, const Real* failed, Real* predicted) {
+bool RobustLayer::stop_in_the_middle(const Signals& signals, Real* state) {
   if (!loop_.parameters().strategy.robust) return false;
-  loop_.evaluate_errors(failed, trial_);
-  loop_.evaluate_robust_term(trial_);
-  failed_ = trial_.robust;
-  loop_.evaluate_errors(predicted, trial_);
+  loop_.evaluate_errors(state, trial_);
   loop_.evaluate_robust_term(trial_);
   const Real far = 0.5 * loop_.parameters().gains.delta;
-  bool moved = false;
-  for (int p = 0; p < loop_.shape().actions(); ++p) {
-    const Real start = trial_.robust[at(p)];
-    if (!(std::max(std::fabs(failed_[at(p)] - start), std::fabs(signals.robust[at(p)] - start)) > far)) continue;
-    predicted[place_[at(p)]] -= trial_.error[at(p)];
-    moved = true;
+  bool stopped = false;
+  for (std::size_t p = 0; p < place_.size(); ++p) {
+    const Real before = signals.robust[p];
+    const Real now = trial_.robust[p];
+    if (!(before * now < 0.0 && std::fabs(now - before) > far)) continue;
+    state[place_[p]] -= trial_.error[p];
+    stopped = true;
   }
-  return moved;
+  return stopped;
 }
 
 }  // namespace mixed_order_game

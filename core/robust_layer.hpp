@@ -13,24 +13,26 @@ class RobustLayer {
  public:
   explicit RobustLayer(const ClosedLoop& loop);
 
-  /// Whether phi at this state is what the linearization foretells: gamma times the differences, as far as the solution
-  /// follows them, weighted like the rates that they enter, up to the tolerance in each column. Signals belong to the
-  /// state that the last correction set out from, slopes to the factorized Jacobian. A solution follows a difference by
-  /// 1 / (1 + gamma slope) of it, with the lesser of the slopes foretold and found.
+  /// Whether phi at this state is what the linearization foretells: gamma times the defects, as far as the solution
+  /// follows them, weighted like the velocity, action or weights that they move, up to the tolerance in each column.
+  /// Signals belong to the state that the last correction set out from, slopes to the factorized Jacobian. A solution
+  /// follows a defect by 1 / (1 + gamma slope) of it, with the lesser of the slopes foretold and found.
   [[nodiscard]] bool linearization_holds(const LoopJacobian& jacobian, const Signals& signals, const Real* state,
                                          Real gamma, const Real* weight, Real tolerance);
 
-  /// Moves a predicted state, from which an iteration failed, to the middle e = 0 of the layer in all columns that
-  /// the iteration carried across, by their velocity or (order 1) action; false when there is none. On either side of
-  /// the middle e + a phi(e) is concave or convex, so that Newton's iteration with a Jacobian of its own at each
-  /// iterate converges from there without jumping. Signals are those of the failed iteration's last evaluation.
-  bool move_to_middle(const Signals& signals, const Real* failed, Real* predicted);
+  /// Stops columns that a correction, which set out from the signals' state, carried across the layer: puts them in its
+  /// middle e = 0 by their velocity or (order 1) action. False when there was none. On either side of the middle
+  /// e + a phi(e) is concave or convex, so that Newton's iteration with a Jacobian of its own at each iterate converges
+  /// from there without another crossing.
+  bool stop_in_the_middle(const Signals& signals, Real* state);
 
  private:
+  void find_weights(const LoopJacobian& jacobian, Real gamma, const Real* weight);
+
   const ClosedLoop& loop_;
   std::vector<int> place_;  // per column: where the state holds the number that its error follows one to one
   Signals trial_;
-  AlignedVector failed_;  // phi
+  AlignedVector weight_;  // per column
 };
 
 }  // namespace mixed_order_game

@@ -85,6 +85,12 @@ N_Vector clone_vector(N_Vector vector) {
   return clone;
 }
 
+/// What CVODE and its callbacks read and write by themselves, not by an operation.
+SunReal* data_of(N_Vector vector) {
+  prediction_of(vector).finish();
+  return NV_DATA_S(vector);
+}
+
 // CVODE spends its time in a handful of vector operations: these replace the library's by the kernels. The others
 // belong to the choice of the first step, when no prediction is kept back.
 
@@ -198,6 +204,7 @@ VectorHandle make_vector(int size, SUNContext context) {
   N_VCopyOps(pattern.get(), vector);
   vector->ops->nvclone = clone_vector;
   vector->ops->nvdestroy = destroy_vector;
+  vector->ops->nvgetarraypointer = data_of;
   vector->ops->nvlinearsum = vector_linear_sum;
   vector->ops->nvscale = vector_scale;
   vector->ops->nvscalevectorarray = vector_scale_several;

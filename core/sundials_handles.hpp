@@ -41,7 +41,8 @@ using LinearSolverHandle = std::unique_ptr<std::remove_pointer_t<SUNLinearSolver
 /// Without output to files or streams.
 ContextHandle make_context();
 
-/// Zero, with the vector operations that CVODE spends its time in replaced by the kernels.
+/// Zero, with the vector operations that CVODE spends its time in replaced by the kernels. Data are had by
+/// N_VGetArrayPointer, never by the macros of the serial vector: it does first what operations have kept back.
 VectorHandle make_vector(int size, SUNContext context);
 
 /// Throws std::bad_alloc when memory was too short for a clone of the vector since it was made: the clones then share

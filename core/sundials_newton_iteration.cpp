@@ -1,7 +1,6 @@
 #include "sundials_newton_iteration.hpp"
 
 #include <cvode/cvode.h>
-#include <nvector/nvector_serial.h>
 
 #include <algorithm>
 #include <cmath>
@@ -63,7 +62,6 @@ NewtonIteration::~NewtonIteration() { SUNNonlinSolFreeEmpty(handle_); }
 
 void NewtonIteration::reset() {
   convergence_rate_ = 1.0;
-  jacobian_is_current_ = false;
   iterations_ = 0;
 }
 
@@ -75,34 +73,26 @@ NewtonIteration::Step NewtonIteration::step_of(void* cvode) {
   N_Vector zn1 = nullptr;
   void* user_data = nullptr;
   CVodeGetNonlinearSystemData(cvode, &step.t, &predicted, &iterate, &rate, &step.gamma, &step.rl1, &zn1, &user_data);
-  step.predicted = NV_DATA_S(predicted);
-  step.zn1 = NV_DATA_S(zn1);
-  step.y = NV_DATA_S(iterate);
-  step.f = NV_DATA_S(rate);
+  step.predicted = N_VGetArrayPointer(predicted);
+  step.zn1 = N_VGetArrayPointer(zn1);
+  step.y = N_VGetArrayPointer(iterate);
+  step.f = N_VGetArrayPointer(rate);
   return step;
 }
 
 int NewtonIteration::solve(N_Vector correction, N_Vector weight, Real tolerance, bool factorize, void* cvode) {
-  Real* c = NV_DATA_S(correction);  // CVODE has set it to zero
-  const Real* w = NV_DATA_S(weight);
+  Real* c = N_VGetArrayPointer(correction);  // CVODE has set it to zero
+  const Real* w = N_VGetArrayPointer(weight);
+  const auto n = static_cast<std::int64_t>(delta_.size());
   last_iterations_ = last_failures_ = 0;
   step_ = step_of(cvode);
-  std::copy_n(step_.predicted, delta_.size(), step_.y);
+  std::copy_n(step_.predicted, n, step_.y);
   int result = iterate(c, w, tolerance, factorize ? Factorize::once : Factorize::never, cvode);
-  if (result == SUN_NLS_CONV_RECVR) result = iterate_again(c, w, tolerance, cvode);
-  if (result == 0) jacobian_is_current_ = false;
-  return result;
-}
-
-int NewtonIteration::iterate_again(Real* correction, const Real* weight, Real tolerance, void* cvode) {
+  if (result != SUN_NLS_CONV_RECVR) return result;
   ++last_failures_;
-  const auto n = static_cast<std::int64_t>(delta_.size());
-  std::copy_n(step_.predicted, n, delta_.data());
-  const bool moved = system_.move_start(step_.y, delta_.data());
-  if (!moved && jacobian_is_current_) return SUN_NLS_CONV_RECVR;
-  std::copy_n(delta_.data(), n, step_.y);
-  kernels().linear_sum(n, 1.0, step_.y, -1.0, step_.predicted, correction);
-  return iterate(correction, weight, tolerance, moved ? Factorize::always : Factorize::once, cvode);
+  std::copy_n(step_.predicted, n, step_.y);
+  kernels().fill(n, 0.0, c);
+  return iterate(c, w, tolerance, Factorize::always, cvode);
 }
 
 /// From the state y = predicted + correction.
@@ -118,7 +108,6 @@ int NewtonIteration::iterate(Real* correction, const Real* weight, Real toleranc
     if (carefully || (number == 0 && factorize == Factorize::once)) {
       SunBoolean current = 0;
       const int result = factor_(last_failures_ != 0 ? 1 : 0, &current, cvode);
-      jacobian_is_current_ = current != 0;
       if (result != 0) return result;
       factored_gamma_ = gamma;
       convergence_rate_ = rate_after_factorization;
@@ -133,7 +122,9 @@ int NewtonIteration::iterate(Real* correction, const Real* weight, Real toleranc
     const Real size = scale * std::sqrt(squares / static_cast<Real>(n));
     kernel.add_correction(n, scale, delta_.data(), predicted, correction, y);
     if (number > 0) convergence_rate_ = std::max(0.3 * convergence_rate_, size / last_size);
-    const bool converged = size * std::min(1.0, convergence_rate_) <= tolerance;
+    const bool stopped = carefully && system_.stop_correction(y);
+    if (stopped) kernel.linear_sum(n, 1.0, y, -1.0, predicted, correction);
+    const bool converged = !stopped && size * std::min(1.0, convergence_rate_) <= tolerance;
     if (converged && system_.linearization_holds(y, gamma, weight, tolerance)) return 0;
     const bool diverges = !carefully && number > 0 && size > 2.0 * last_size;
     const int most = carefully ? most_careful_iterations : most_iterations_;

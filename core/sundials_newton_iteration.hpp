@@ -3,7 +3,7 @@
 // A step solves  r(c) = c + rl1 zn1 - gamma f(t, ypred + c) = 0  for the correction c. It does what the library's own
 // iteration does, with each pass over the vectors done once and without copies. It expects a good rate of convergence
 // of a new factorization, believes in convergence only where the linearization holds, and where it fails begins once
-// more from a place that the system knows.
+// more, carefully: with a factorization at each iterate and corrections that the system may stop on their way.
 #pragma once
 
 #include <sundials/sundials_nonlinearsolver.h>
@@ -24,9 +24,9 @@ class NewtonSystem {
   /// Whether the rates at this state, times gamma, are those that the factorized matrix foretells from the state of
   /// the last evaluation, weighted and up to the tolerance in each entry.
   virtual bool linearization_holds(const Real* state, Real gamma, const Real* weight, Real tolerance) noexcept = 0;
-  /// Moves the predicted state, from which an iteration failed with this last iterate, to where one that factorizes
-  /// at each iterate will converge; false when it knows of no such place.
-  virtual bool move_start(const Real* failed, Real* predicted) noexcept = 0;
+  /// Changes the state, to which a correction led from that of the last evaluation and factorization, where the
+  /// correction went further than its linearization reaches; false when it did not.
+  virtual bool stop_correction(Real* state) noexcept = 0;
 
  protected:
   ~NewtonSystem() = default;
@@ -65,7 +65,6 @@ class NewtonIteration {
 
   int solve(N_Vector correction, N_Vector weight, Real tolerance, bool factorize, void* cvode);
   int iterate(Real* correction, const Real* weight, Real tolerance, Factorize factorize, void* cvode);
-  int iterate_again(Real* correction, const Real* weight, Real tolerance, void* cvode);
 
   NewtonSystem& system_;
   SUNNonlinSolLSetupFn factor_ = nullptr;
@@ -75,7 +74,6 @@ class NewtonIteration {
   SUNNonlinearSolver handle_;  // made last: nothing after it can fail
   Real factored_gamma_ = 0.0;
   Real convergence_rate_ = 1.0;
-  bool jacobian_is_current_ = false;
   int last_iterations_ = 0;
   int last_failures_ = 0;
   std::int64_t iterations_ = 0;

@@ -60,8 +60,8 @@ void Evaluation::prepare_signals(const Standing& standing) {
 }
 
 // Of the signals it writes those of seeking only, which prepare_signals finds for the same state.
-void Evaluation::event_indicators(const Standing& standing, Real* values) {
-  loop_.event_functions(standing.state, *standing.modes, signals_, values);
+void Evaluation::event_indicators(const Standing& standing, Real tolerance, Real* values) {
+  loop_.event_functions(standing.state, *standing.modes, tolerance, signals_, values);
 }
 
 void Evaluation::prepare_equilibrium(Settings& settings) {

@@ -38,7 +38,7 @@ class Evaluation {
   void prepare(Stage stage, Settings& settings, const Standing& standing);
   void prepare_signals(const Standing& standing);
   /// One for each weight column, as ClosedLoop::event_functions.
-  void event_indicators(const Standing& standing, Real* values);
+  void event_indicators(const Standing& standing, Real tolerance, Real* values);
   /// Throws GameError when the game has no unique equilibrium.
   void prepare_equilibrium(Settings& settings);
 

@@ -394,7 +394,7 @@ void Instance::do_step(Real t, Real h) {
 
 bool Instance::new_discrete_states() {
   event_indicators();  // where they are not finite, no mode can be found
-  return model_exchange_->update_modes();
+  return model_exchange_->update_modes(tolerances().relative);
 }
 
 void Instance::enter_continuous_time_mode() {
@@ -450,7 +450,7 @@ void Instance::get_derivatives(std::span<Real> rate) {
 std::span<const Real> Instance::event_indicators() {
   act();
   scratch_.resize(initial_modes_.size());
-  evaluation_.event_indicators(standing(), scratch_.data());
+  evaluation_.event_indicators(standing(), tolerances().relative, scratch_.data());
   if (!std::all_of(scratch_.begin(), scratch_.end(), [](Real value) { return std::isfinite(value); })) {
     throw NotComputable("an event indicator is not finite");
   }

@@ -36,16 +36,13 @@ void ModelExchange::set_state(std::span<const Real> state) {
   evaluation_.moved();
 }
 
-bool ModelExchange::update_modes() {
+bool ModelExchange::update_modes(Real tolerance) {
   const ClosedLoop& loop = evaluation_.loop();
-  evaluation_.prepare_signals(standing());
-  AlignedVector norm2(point_.modes.size());
-  loop.weight_norms(point_.state.data(), norm2.data());
+  Signals signals(loop.shape());
   Modes modes = point_.modes;
-  loop.resolve_modes(norm2.data(), evaluation_.signals(), modes);
-  for (std::size_t p = 0; p < modes.size(); ++p) point_.events += modes[p] != point_.modes[p] ? 1 : 0;
+  point_.events += loop.resolve_modes(point_.state.data(), tolerance, signals, modes);
   AlignedVector state = point_.state;
-  loop.project(modes, state.data());
+  loop.project(modes, signals, state.data());
   const bool moved = state != point_.state;
   if (moved || modes != point_.modes) evaluation_.moved();
   point_.state = std::move(state);

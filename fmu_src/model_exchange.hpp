@@ -27,9 +27,9 @@ class ModelExchange {
   void set_time(Real t);
   void set_state(std::span<const Real> state);
 
-  /// Gives each column the mode that it has from here on and puts the state where the modes say it is: a column that
-  /// enters lies exactly on the sphere then. True when that moved the state.
-  bool update_modes();
+  /// Gives each column the mode that it has from here on, as ClosedLoop::resolve_modes, and puts the state within the
+  /// bound: a column that enters lies exactly on the sphere then. True when that moved the state.
+  bool update_modes(Real tolerance);
 
   [[nodiscard]] const Point& save() const { return point_; }
 

@@ -166,9 +166,12 @@ TEST_P(ClosedLoopOfRandomGame, EventFunctionsBelongToTheirStateWhateverTheSignal
   loop_.weight_norms(state.flat().data(), norm2.data());
   Signals signals(loop_.shape());  // of no state yet
   std::vector<Real> values(modes.size());
-  loop_.event_functions(state.flat().data(), modes, signals, values.data());
+  constexpr Real tolerance = 1e-4;
+  loop_.event_functions(state.flat().data(), modes, tolerance, signals, values.data());
   for (std::size_t p = 0; p < modes.size(); ++p) {
-    const Real value = modes[p] != 0 ? -error[p] * network[p] : norm2[p] / game_.W_max - 1.0;
+    const Real height = norm2[p] / game_.W_max - 1.0;
+    const Real falling = -2.0 * game_.beta * error[p] * network[p] / game_.W_max;
+    const Real value = modes[p] != 0 ? std::min(-tolerance - height, falling) : height;
     EXPECT_NEAR(values[p], value, 2e-12 * (1.0 + std::abs(value))) << "column " << p;
   }
 }
@@ -219,66 +222,78 @@ TEST_F(TwoScalarPlayers, SignsOfTheLawsAreThePapers) {
 }
 
 TEST_F(TwoScalarPlayers, ModesFollowTheNormAndTheDirection) {
-  std::vector<Real> norm2{4.0, 3.9};
+  constexpr Real tolerance = 1e-3;
+  const int x1 = 0, z1 = 2, w1 = 8;
+  std::vector<Real> state(at(layout_.size()), 0.0);
   Modes modes(2, 0);
-  const auto resolved = [&](Real e, Real network) {
-    std::fill(signals_.error.begin(), signals_.error.end(), e);
-    std::fill(signals_.network.begin(), signals_.network.end(), network);
-    loop_.resolve_modes(norm2.data(), signals_, modes);
+  // the only neuron's activation is positive, so that e w'S has the sign of e w
+  const auto resolved = [&](Real norm2, Real e) {
+    state[at(w1)] = std::sqrt(norm2);
+    state[at(x1)] = state[at(z1)] + e;
+    const Modes before = modes;
+    const int changed = loop_.resolve_modes(state.data(), tolerance, signals_, modes);
+    EXPECT_EQ(changed, before != modes ? 1 : 0);
     return modes;
   };
-  EXPECT_EQ(resolved(1.0, 2.0), (Modes{1, 0}));  // reached the sphere, pushed outwards
-  norm2 = {3.99, 3.9};
-  EXPECT_EQ(resolved(-1.0, -2.0), (Modes{1, 0}));  // stays there while e w'S >= 0, whatever rounding did to the norm
-  EXPECT_EQ(resolved(0.0, -2.0), (Modes{1, 0}));
-  EXPECT_EQ(resolved(-1.0, 2.0), (Modes{0, 0}));  // leaves when e w'S turns negative
-  norm2 = {4.1, 4.0};
-  EXPECT_EQ(resolved(1.0, -2.0), (Modes{0, 0}));
-  EXPECT_EQ(resolved(1.0, 2.0), (Modes{1, 1}));
+  const Modes inside{0, 0};
+  const Modes on_sphere{1, 0};
+  EXPECT_EQ(resolved(3.9, 1.0), inside);
+  EXPECT_EQ(resolved(4.0001, 1.0), on_sphere);
+  EXPECT_EQ(resolved(3.9, 1e-9), on_sphere);  // pushed outward it stays, whatever the norm drifted to
+  EXPECT_EQ(resolved(3.9, 0.0), on_sphere);
+  EXPECT_EQ(resolved(4.0 * (1.0 - 0.9e-3), -1.0), on_sphere);  // on its way inward, but not yet by the tolerance
+  EXPECT_EQ(resolved(4.0 * (1.0 - 1.1e-3), -1e-9), inside);
+  EXPECT_EQ(resolved(4.0 * (1.0 - 1.1e-3), 1.0), inside);  // on its way back
+  EXPECT_EQ(resolved(4.0001, -1.0), on_sphere);            // where its rates are those inside
 }
 
-TEST_F(TwoScalarPlayers, WithoutTheNetworkNoColumnIsOnTheSphere) {
+TEST_F(TwoScalarPlayers, WithoutTheNetworkNoColumnReachesTheSphere) {
   loop_.parameters().strategy.robust = false;
-  const std::vector<Real> norm2{4.0, 4.0};
-  Modes modes(2, 1);
-  std::fill(signals_.error.begin(), signals_.error.end(), 1.0);
-  std::fill(signals_.network.begin(), signals_.network.end(), 1.0);
-  loop_.resolve_modes(norm2.data(), signals_, modes);
+  const std::vector<Real> state(at(layout_.size()), 10.0);
+  Modes modes(2, 0);
+  EXPECT_EQ(loop_.resolve_modes(state.data(), 1e-6, signals_, modes), 0);
   EXPECT_EQ(modes, (Modes{0, 0}));
 }
 
 TEST(ProjectedState, LiesOnTheSphereOrInsideIt) {
-  const PlainGame game = random_game({.seed = 78, .players = 2, .dimension = 3, .neurons = 4, .order = {1, 2}});
+  const PlainGame game = random_game({.seed = 78, .players = 2, .dimension = 3, .neurons = 4, .order = {1, 1}});
   const ClosedLoop loop(parse_game(toml_of(game)).parameters);
   RandomNumbers random(5);
   std::vector<std::vector<int>> on_sphere;
   LoopState<Real> before = random_state(game, random, on_sphere);
-  for (std::size_t m = 0; m < 4; ++m) {
-    before.W[0][m][0] *= 1.01;   // on the sphere, outside it
-    before.W[0][m][2] *= 0.99;   // on the sphere, inside it
-    before.W[1][m][1] = 0.0;     // inside, at the origin
-    before.W[0][m][1] *= 100.0;  // inside, but above the bound
+  const auto norm2 = [](const LoopState<Real>& state, std::size_t i, std::size_t l) {
+    Real sum = 0.0;
+    for (const auto& row : state.W[i]) sum += row[l] * row[l];
+    return sum;
+  };
+  const Rows wanted = {{1.02, 1e4, 0.98}, {0.0, 0.3, 0.98}};  // of W_max
+  on_sphere = {{1, 0, 1}, {1, 0, 1}};
+  const Rows outward = {{-1.0, 1.0, 1.0}, {1.0, 1.0, -1.0}};
+  for (std::size_t i = 0; i < 2; ++i) {
+    for (std::size_t l = 0; l < 3; ++l) {
+      const Real factor = std::sqrt(wanted[i][l] * game.W_max / norm2(before, i, l));
+      for (auto& row : before.W[i]) row[l] = std::fabs(factor * row[l]);  // so that w'S > 0
+      before.x[i][l] = before.reference[i][l] + outward[i][l];
+    }
   }
-  on_sphere = {{1, 0, 1}, {0, 0, 0}};
   std::vector<Real> state = before.flat();
-  loop.project(modes_of(on_sphere), state.data());
+  Signals signals(loop.shape());
+  loop.project(modes_of(on_sphere), signals, state.data());
   LoopState<Real> after(game);
   after.set_flat(state);
   EXPECT_EQ(after.x, before.x);
   EXPECT_EQ(after.reference, before.reference);
   EXPECT_EQ(after.y, before.y);
-  for (const auto& [i, l] : {std::pair{0, 0}, {0, 1}, {0, 2}}) {
-    Real norm2 = 0.0;
-    for (std::size_t m = 0; m < 4; ++m) {
-      const Real w = after.W[at(i)][m][at(l)];
-      norm2 += w * w;
-      EXPECT_NEAR(w / before.W[at(i)][m][at(l)], after.W[at(i)][0][at(l)] / before.W[at(i)][0][at(l)], 1e-14);
+  // above the bound twice, drifted while it slides; at the origin, inside, on its way inward
+  const Rows expected = {{1.0, 1.0, 1.0}, {0.0, 0.3, 0.98}};
+  for (std::size_t i = 0; i < 2; ++i) {
+    for (std::size_t l = 0; l < 3; ++l) {
+      EXPECT_NEAR(norm2(after, i, l), expected[i][l] * game.W_max, 1e-14 * game.W_max) << i << ' ' << l;
+      const Real factor = wanted[i][l] > 0.0 ? std::sqrt(expected[i][l] / wanted[i][l]) : 1.0;
+      for (std::size_t m = 0; m < 4; ++m) {
+        EXPECT_NEAR(after.W[i][m][l], factor * before.W[i][m][l], 1e-14 * before.W[i][m][l]) << i << ' ' << l;
+      }
     }
-    EXPECT_NEAR(norm2, game.W_max, 1e-14 * game.W_max) << i << ' ' << l;
-  }
-  for (std::size_t m = 0; m < 4; ++m) {
-    EXPECT_EQ(after.W[1][m][1], 0.0);
-    EXPECT_EQ(after.W[1][m][2], before.W[1][m][2]);
   }
 }
 

@@ -37,7 +37,14 @@ class NewtonSystem {
     random_.fill(state, -2.0, 2.0);
     Modes modes(at(shape.actions()), 0);
     for (auto& mode : modes) mode = random_.chance(0.5) ? 1 : 0;
-    loop_.project(modes, state.data());
+    AlignedVector norm2(modes.size());
+    loop_.weight_norms(state.data(), norm2.data());
+    for (int m = 0; m < shape.neurons; ++m) {
+      for (std::size_t p = 0; p < modes.size(); ++p) {
+        const Real scale = std::sqrt(loop_.parameters().rbf.W_max / norm2[p]);
+        if (modes[p] != 0 || scale < 1.0) state[at(loop_.layout().weights_of(m)) + p] *= scale;
+      }
+    }
     const std::vector<Real> d_ext(at(shape.actions()), 0.0);
     Signals signals(shape);
     std::vector<Real> rate(state.size());

@@ -69,9 +69,8 @@ class Stepper final : public NewtonSystem {
   Stepper& operator=(const Stepper&) = delete;
 
   int advance(Real t) { return CVode(cvode_, t, state_, &time_, CV_NORMAL); }
-  /// Where an iteration that failed begins again.
-  void set_move(std::function<bool(const Vector&, Eigen::Map<Vector>&)> move) { move_ = std::move(move); }
-  [[nodiscard]] int moves() const { return moves_; }
+  /// Where a correction of an iteration that begins again, careful, is stopped: (its start, the state it led to).
+  void set_stop(std::function<bool(const Vector&, Eigen::Map<Vector>&)> stop) { stop_ = std::move(stop); }
   [[nodiscard]] long steps() const {
     long steps = 0;
     CVodeGetNumSteps(cvode_, &steps);
@@ -97,11 +96,9 @@ class Stepper final : public NewtonSystem {
     const Vector correction = (Matrix::Identity(size_, size_) - gamma * jacobian_(y)).partialPivLu().solve(missed);
     return correction.cwiseProduct(Eigen::Map<const Vector>(weight, size_)).norm() <= tolerance;
   }
-  bool move_start(const Real* failed, Real* predicted) noexcept override {
-    if (move_ == nullptr) return false;
-    Eigen::Map<Vector> moved(predicted, size_);
-    ++moves_;
-    return move_(Eigen::Map<const Vector>(failed, size_), moved);
+  bool stop_correction(Real* state) noexcept override {
+    Eigen::Map<Vector> y(state, size_);
+    return stop_ != nullptr && stop_(evaluated_, y);
   }
   void factor(const Real* state, Real gamma) {
     factored_ = jacobian_(Eigen::Map<const Vector>(state, size_));
@@ -115,9 +112,8 @@ class Stepper final : public NewtonSystem {
 
   std::function<Vector(const Vector&)> rates_;
   std::function<Matrix(const Vector&)> jacobian_;
-  std::function<bool(const Vector&, Eigen::Map<Vector>&)> move_;
+  std::function<bool(const Vector&, Eigen::Map<Vector>&)> stop_;
   int size_;
-  int moves_ = 0;
   Real time_ = 0.0;
   Vector evaluated_;
   Matrix factored_;
@@ -167,7 +163,7 @@ TEST(NewtonIteration, StopsWhereTheRatesAreNoLongerFinite) {
 }
 
 // y_0' = (1 + cos y_1) / 4 - tanh(y_0 / width) reaches y_0 = 0 and slides there.
-TEST(NewtonIteration, BeginsAgainWhereTheSystemKnows) {
+TEST(NewtonIteration, BeginsAgainWithCorrectionsThatTheSystemStops) {
   using Vector = Eigen::VectorXd;
   using Matrix = Eigen::MatrixXd;
   constexpr Real width = 1e-11;
@@ -178,15 +174,17 @@ TEST(NewtonIteration, BeginsAgainWhereTheSystemKnows) {
                     return Matrix{{-(1.0 - tanh * tanh) / width, -std::sin(y[1]) / 4.0}, {0.0, 0.0}};
                   },
                   Vector{{1.0, 0.0}}, 1e-6, Vector{{1e-8, 1e-8}});
-  stepper.set_move([](const Vector& failed, Eigen::Map<Vector>& predicted) {
-    EXPECT_NE(failed[0], predicted[0]);
-    predicted[0] = 0.0;
+  int stops = 0;
+  stepper.set_stop([&](const Vector& from, Eigen::Map<Vector>& to) {
+    if (!(from[0] * to[0] < 0.0 && std::fabs(to[0] - from[0]) > width)) return false;
+    to[0] = 0.0;
+    ++stops;
     return true;
   });
   ASSERT_EQ(stepper.advance(10.0), CV_SUCCESS);
   EXPECT_NEAR(stepper.state(0), 0.0, 1e-8);
   EXPECT_NEAR(stepper.state(1), 10.0, 1e-4);
-  EXPECT_GT(stepper.moves(), 0);
+  EXPECT_GT(stops, 0);
   EXPECT_LT(stepper.steps(), 300);
 }
 
