@@ -303,9 +303,12 @@ class _Search:
         self.loops = [graph.adjacency for graph in self.graphs]
         self.deviation = initial_deviation(self.game)
         largest = float(np.abs(self.deviation[: self.game.players]).max())
+        rounding = 1e-12 * (1.0 + float(np.abs(self.game.x0).max()))
+        if band is None and largest <= rounding:
+            raise TuneError("every player starts at its equilibrium: give the band that counts as settled")
         self.band = SETTLED * largest if band is None else band
         if self.band <= 0.0:
-            raise TuneError("every player starts at its equilibrium: give the band that counts as settled")
+            raise TuneError(f"the band {self.band:g} is not positive")
         self.start = {name: float(model.start_values(self.fixed)[name]) for name in self.names}
 
     def run(self, seed: int, progress: Progress) -> Tuned:
