@@ -39,6 +39,7 @@ function(collect_license name)
 endfunction()
 collect_license(sundials /usr/share/doc/libsundials-dev/copyright "${sundials_SOURCE_DIR}/LICENSE")
 collect_license(eigen /usr/share/doc/libeigen3-dev/copyright "${eigen_SOURCE_DIR}/COPYING.MPL2")
+collect_license(pegtl /usr/share/doc/tao-pegtl-dev/copyright "${pegtl_SOURCE_DIR}/LICENSE")
 collect_license(tomlplusplus /usr/share/doc/libtomlplusplus-dev/copyright "${tomlplusplus_SOURCE_DIR}/LICENSE")
 collect_license(pugixml /usr/share/doc/libpugixml-dev/copyright "${pugixml_SOURCE_DIR}/LICENSE.md")  # in the host tool
 string(REGEX MATCH "^[0-9]+" gcc_version "${CMAKE_CXX_COMPILER_VERSION}")

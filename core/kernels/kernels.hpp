@@ -6,6 +6,8 @@
 
 #include <cstdint>
 
+#include "expression/operation.hpp"
+
 namespace mixed_order_game {
 
 /// Neighbours of each player with their edge weights a_ik, as compressed rows.
@@ -68,6 +70,9 @@ struct Kernels {
   void (*weight_rates)(int n, int neurons, double beta, const double* e, const double* radial, const double* activation,
                        const double* weights, double* rate);
   double (*dot)(int n, const double* a, const double* b);
+
+  /// Runs the code of a tape over rows of lanes, a whole number of vectors each; row k begins at rows + k * lanes.
+  void (*run_tape)(int count, const TapeInstruction* code, int lanes, double* rows);
 
   // Newton solver
   /// L D L' of the blocks of one tile, in place; the diagonal is replaced by its inverse.

@@ -30,6 +30,7 @@ namespace {
 #include "dense_lu.ipp"
 #include "vector_operations.ipp"
 #include "nordsieck.ipp"
+#include "tape.ipp"
 // clang-format on
 
 }  // namespace
@@ -45,6 +46,7 @@ const Kernels MIXED_ORDER_GAME_JOIN(kernels_, MIXED_ORDER_GAME_LEVEL) = {
     column_products,
     weight_rates,
     dot,
+    run_tape,
     factor_blocks,
     solve_blocks,
     factor_modes,

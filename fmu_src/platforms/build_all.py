@@ -57,7 +57,7 @@ LICENSES = {
 }
 """What the compiler links into the libraries: names in the archive, and files of the ziglang package."""
 
-HEADERS_ONLY = ("eigen", "tomlplusplus")
+HEADERS_ONLY = ("eigen", "pegtl", "tomlplusplus")
 """Licences that the native build has collected."""
 
 
@@ -103,6 +103,7 @@ class Build:
         }
         if self.include is not None:
             options["TOMLPLUSPLUS_INCLUDE_DIR"] = self.include
+            options["PEGTL_INCLUDE_DIR"] = self.include
         definitions = [f"-D{name}={value}" for name, value in options.items()]
         commands: list[list[str | Path]] = [
             ["cmake", "-S", ROOT / "fmu_src" / "platforms", "-B", here, *definitions],
@@ -210,18 +211,19 @@ class Build:
     def _header_folders(self) -> Path | None:
         """A folder with links to packages of headers, because the rest of /usr/include is of this machine.
 
-        Eigen has a folder of its own already. Without toml++ CMake fetches its pinned release.
+        Eigen has a folder of its own already. What is missing CMake fetches as a pinned release.
         """
         include = self.folder / "include"
         include.mkdir(exist_ok=True)
-        link = include / "toml++"
-        for place in ("/usr/include", "/usr/local/include"):
-            headers = Path(place) / "toml++"
-            if headers.is_dir():
-                if not link.exists():
-                    link.symlink_to(headers)
-                return include
-        return None
+        found = True
+        for name in ("toml++", "tao"):
+            link = include / name
+            places = (Path("/usr/include") / name, Path("/usr/local/include") / name)
+            headers = next((place for place in places if place.is_dir()), None)
+            if headers is not None and not link.exists():
+                link.symlink_to(headers)
+            found = found and headers is not None
+        return include if found else None
 
 
 def _fmi_headers() -> Path:

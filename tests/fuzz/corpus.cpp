@@ -2,6 +2,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 
 #include "call_code.hpp"
 #include "fuzzed_game.hpp"
@@ -97,5 +98,12 @@ int main(int count, char** arguments) {
     write(folder / "call_sequences", std::to_string(game) + "_co_simulation", co_simulation(game).bytes);
     write(folder / "call_sequences", std::to_string(game) + "_model_exchange", model_exchange(game).bytes);
   }
+  const char* texts[] = {
+      "(x[i,1] - h[i])^2 - p * x[i,1] * exp(-0.1 * sum(x[j,1] for j in 1..N if j != i))",
+      "sin(x[i,l]) * x[mod(i, N) + 1, 1] - 0.5 * v[max(i, 2), l] * tanh(v[2,1] / 0.1)",
+      "0.3 * cos(2 * t) + exp(-t) - R[1,2] * pi^-1.5e0",
+      "if(i > 1 and not l == 2 or order[i] <= 1, log1p(hypot(x[i,1], 2)), atan2(x[1,1], 1)) / prod(k for k in 1..3)",
+  };
+  for (std::size_t k = 0; k < std::size(texts); ++k) write(folder / "expressions", std::to_string(k), texts[k]);
   return 0;
 }

@@ -88,6 +88,7 @@ def test_members(fmu: Path) -> None:
         ("sundials", "Lawrence Livermore National Security"),
         ("eigen", "Mozilla Public License"),
         ("tomlplusplus", "Mark Gillard"),
+        ("pegtl", "Colin Hirsch"),
         ("libstdc++", "GCC RUNTIME LIBRARY EXCEPTION"),
     ],
 )

@@ -1,0 +1,171 @@
+#include "expression/tape.hpp"
+
+#include <algorithm>
+#include <map>
+
+#include "kernels/kernels.hpp"
+
+namespace mixed_order_game {
+
+namespace {
+
+constexpr int lane_multiple = 8;
+constexpr std::size_t most_lanes = 32;  // so that the rows of a tape stay in the nearest caches
+
+/// The nodes that the results need, in the order of a walk that goes to the first operand first: equal for players
+/// whose expressions have the same structure.
+struct Linearized {
+  std::vector<int> nodes;
+  std::vector<int> signature;
+};
+
+Linearized linearize(const PlayerResults& results) {
+  const ExpressionGraph& graph = *results.graph;
+  Linearized all;
+  std::vector<int> number(at(graph.size()), -1);
+  for (const int result : results.nodes) {
+    std::vector<int> path{result};
+    while (!path.empty()) {
+      const int k = path.back();
+      const GraphNode& node = graph.node(k);
+      if (number[at(k)] >= 0) {
+        path.pop_back();
+        continue;
+      }
+      const bool has_operands = node.operation != Operation::number && node.operation != Operation::leaf;
+      bool waits = false;
+      for (const int operand : {node.b, node.a}) {
+        if (has_operands && operand >= 0 && number[at(operand)] < 0) {
+          path.push_back(operand);
+          waits = true;
+        }
+      }
+      if (waits) continue;
+      path.pop_back();
+      number[at(k)] = static_cast<int>(all.nodes.size());
+      all.nodes.push_back(k);
+      all.signature.push_back(static_cast<int>(node.operation));
+      if (node.operation == Operation::leaf) all.signature.push_back(static_cast<int>(graph.leaf_of(k).kind));
+      if (has_operands) {
+        all.signature.push_back(number[at(node.a)]);
+        all.signature.push_back(node.b < 0 ? -1 : number[at(node.b)]);
+      }
+    }
+    all.signature.push_back(-2);
+    all.signature.push_back(number[at(result)]);
+  }
+  return all;
+}
+
+}  // namespace
+
+Tapes::Tapes(const std::vector<PlayerResults>& results) {
+  std::map<std::vector<int>, std::vector<const PlayerResults*>> groups;
+  std::vector<const std::vector<int>*> order;  // of the first players
+  for (const PlayerResults& one : results) {
+    if (one.nodes.empty()) continue;
+    const auto [group, is_new] = groups.try_emplace(linearize(one).signature);
+    if (is_new) order.push_back(&group->first);
+    group->second.push_back(&one);
+  }
+  std::vector<Tape> tapes;
+  for (const std::vector<int>* signature : order) {
+    const auto& members = groups[*signature];
+    for (std::size_t first = 0; first < members.size(); first += most_lanes) {
+      const std::size_t count = std::min(most_lanes, members.size() - first);
+      Tape tape;
+      tape.lanes = static_cast<int>((count + lane_multiple - 1) / lane_multiple) * lane_multiple;
+      for (std::size_t lane = 0; lane < count; ++lane) {
+        const PlayerResults& member = *members[first + lane];
+        const ExpressionGraph& graph = *member.graph;
+        const std::vector<int> nodes = linearize(member).nodes;
+        std::vector<int> row(at(graph.size()), -1);
+        for (std::size_t k = 0; k < nodes.size(); ++k) row[at(nodes[k])] = static_cast<int>(k);
+        if (lane == 0) {
+          tape.rows = static_cast<int>(nodes.size());
+          tape.start.assign(nodes.size() * at(tape.lanes), 0.0);
+        }
+        std::size_t leaf = 0;
+        for (std::size_t k = 0; k < nodes.size(); ++k) {
+          const GraphNode& node = graph.node(nodes[k]);
+          if (node.operation == Operation::number) {
+            // empty lanes hold what the first one does, so that nothing in them is worse than there
+            for (std::size_t l = lane; l < (lane == 0 ? at(tape.lanes) : lane + 1); ++l) {
+              tape.start[k * at(tape.lanes) + l] = node.value;
+            }
+          } else if (node.operation == Operation::leaf) {
+            const auto& [kind, index] = graph.leaf_of(nodes[k]);
+            if (lane == 0) tape.leaves.push_back({static_cast<int>(k), kind, {}});
+            tape.leaves[leaf++].index.push_back(index);
+          } else if (lane == 0) {
+            tape.code.push_back(
+                {node.operation, static_cast<int>(k), row[at(node.a)], node.b < 0 ? row[at(node.a)] : row[at(node.b)]});
+          }
+        }
+        for (std::size_t k = 0; k < member.nodes.size(); ++k) {
+          if (lane == 0) tape.results.push_back({row[at(member.nodes[k])], {}});
+          tape.results[k].place.push_back(member.places[k]);
+        }
+        tape.players.push_back(member.player);
+      }
+      for (LeafRow& leaf : tape.leaves) leaf.index.resize(at(tape.lanes), leaf.index[0]);
+      tapes.push_back(std::move(tape));
+    }
+  }
+  for (const Tape& tape : tapes) rows_.emplace_back(tape.start.begin(), tape.start.end());
+  tapes_ = std::make_shared<const std::vector<Tape>>(std::move(tapes));
+}
+
+void Tapes::run(std::size_t number, const LeafValues& leaves, Real* result) const {
+  const Tape& tape = (*tapes_)[number];
+  Real* rows = rows_[number].data();
+  const std::size_t lanes = at(tape.lanes);
+  for (const LeafRow& leaf : tape.leaves) {
+    Real* row = rows + at(leaf.row) * lanes;
+    for (std::size_t lane = 0; lane < lanes; ++lane) {
+      const int player = tape.players[lane < tape.players.size() ? lane : 0];
+      switch (leaf.kind) {
+        case LeafKind::action:
+          row[lane] = leaves.points[player * leaves.stride + leaf.index[lane]];
+          break;
+        case LeafKind::velocity:
+          row[lane] = leaves.velocities[leaf.index[lane]];
+          break;
+        case LeafKind::time:
+          row[lane] = leaves.time;
+          break;
+        case LeafKind::parameter:
+          row[lane] = leaves.parameters[leaf.index[lane]];
+          break;
+      }
+    }
+  }
+  kernels().run_tape(static_cast<int>(tape.code.size()), tape.code.data(), tape.lanes, rows);
+  for (const ResultRow& wanted : tape.results) {
+    const Real* row = rows + at(wanted.row) * lanes;
+    for (std::size_t lane = 0; lane < wanted.place.size(); ++lane) result[wanted.place[lane]] = row[lane];
+  }
+}
+
+void Tapes::evaluate(const LeafValues& leaves, Real* result) const {
+  for (std::size_t number = 0; number < rows_.size(); ++number) run(number, leaves, result);
+}
+
+void Tapes::evaluate_player(int player, const LeafValues& leaves, Real* result) const {
+  for (std::size_t number = 0; number < rows_.size(); ++number) {
+    const std::vector<int>& players = (*tapes_)[number].players;
+    if (std::find(players.begin(), players.end(), player) != players.end()) run(number, leaves, result);
+  }
+}
+
+std::size_t Tapes::memory() const {
+  std::size_t bytes = 0;
+  for (std::size_t number = 0; number < rows_.size(); ++number) {
+    const Tape& tape = (*tapes_)[number];
+    bytes += 2 * rows_[number].size() * sizeof(Real) + tape.code.size() * sizeof(TapeInstruction) +
+             (tape.leaves.size() + tape.results.size()) * at(tape.lanes) * sizeof(int);
+  }
+  return bytes;
+}
+
+}  // namespace mixed_order_game
