@@ -29,7 +29,7 @@ void ClosedLoop::initial_state(const InitialState& initial, Real* state) const {
 }
 
 void ClosedLoop::evaluate_errors(const Real* state, Signals& signals) const {
-  const auto& [shape, gains, strategy, rbf, graph, cost, dynamics, disturbance, initial] = parameters_;
+  const auto& [shape, gains, strategy, rbf, graph, cost, dynamics, disturbance, initial, named, guess] = parameters_;
   const Real* x = state + layout_.x();
   const Real* reference = state + layout_.reference();  // z or v
   Real* e = signals.error.data();
@@ -78,7 +78,7 @@ void ClosedLoop::evaluate_seeking(const Real* state, Signals& signals) const {
 void ClosedLoop::evaluate(Real t, const Real* state, const Real* d_ext, const Modes& modes, Signals& signals,
                           Real* rate) const {
   const Kernels& kernel = kernels();
-  const auto& [shape, gains, strategy, rbf, graph, cost, dynamics, disturbance, initial] = parameters_;
+  const auto& [shape, gains, strategy, rbf, graph, cost, dynamics, disturbance, initial, named, guess] = parameters_;
   const int players = shape.players;
   const int n = shape.actions();
   const Real* x = state + layout_.x();
@@ -100,7 +100,7 @@ void ClosedLoop::evaluate(Real t, const Real* state, const Real* d_ext, const Mo
     std::fill(rate + layout_.weights(), rate + layout_.size(), 0.0);
   }
   if (strategy.perturbed) {
-    dynamics->values(x, g);
+    dynamics->values(x, reference, g);
     disturbance->values(t, d);
     for (int p = 0; p < n; ++p) d[p] += d_ext[p];
   } else {

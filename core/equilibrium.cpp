@@ -2,12 +2,13 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
-#include <charconv>
 #include <cmath>
+#include <exception>
 #include <limits>
 #include <numeric>
 
 #include "errors.hpp"
+#include "number_text.hpp"
 
 namespace mixed_order_game {
 
@@ -224,11 +225,6 @@ bool vanish(const std::vector<Real>& gradient, const SparseRows& pattern, const 
   return true;
 }
 
-std::string text_of(Real value) {
-  char text[32];
-  return {text, std::to_chars(text, text + sizeof text, value).ptr};
-}
-
 /// Throws where a player could lower its cost: its own Hessian at x has an eigenvalue that is negative beyond rounding.
 void require_best_responses(const SparseRows& pattern, const std::vector<Real>& hessian, const Shape& shape) {
   constexpr Real rounding = 1e-12;  // of the largest second derivative of the player's cost
@@ -255,11 +251,23 @@ void require_best_responses(const SparseRows& pattern, const std::vector<Real>& 
   }
 }
 
-}  // namespace
+constexpr int most_iterations = 50;
 
-std::vector<Real> nash_equilibrium(const Cost& cost, const Shape& shape) {
-  constexpr int most_iterations = 50;
-  const std::size_t n = at(shape.actions());
+[[noreturn]] void fail_to_converge() {
+  throw GameError("the search for the Nash equilibrium did not converge in " + std::to_string(most_iterations) +
+                  " Newton steps, expected costs with one");
+}
+
+bool is_finite(const std::vector<Real>& numbers) {
+  return std::all_of(numbers.begin(), numbers.end(), [](Real number) { return std::isfinite(number); });
+}
+
+Real norm(const std::vector<Real>& numbers) {
+  return Eigen::Map<const Eigen::VectorXd>(numbers.data(), static_cast<Eigen::Index>(numbers.size())).stableNorm();
+}
+
+/// Of costs whose gradients are affine: one step, and one more against rounding.
+std::vector<Real> affine_equilibrium(const Cost& cost, std::size_t n) {
   const SparseRows& pattern = cost.hessian_pattern();
   std::vector<Real> hessian(at(pattern.entries()));
   std::vector<Real> step(n);
@@ -273,13 +281,66 @@ std::vector<Real> nash_equilibrium(const Cost& cost, const Shape& shape) {
     for (std::size_t p = 0; p < n; ++p) x[p] -= step[p];
     converged = converged || largest_magnitude(step) <= 1e-14 * (1.0 + largest_magnitude(x));
   }
-  if (!converged || !std::all_of(x.begin(), x.end(), [](Real entry) { return std::isfinite(entry); })) {
-    throw GameError("the search for the Nash equilibrium did not converge in " + std::to_string(most_iterations) +
-                    " Newton steps, expected costs with one");
-  }
-  cost.hessian_rows(x.data(), 0, hessian.data());
-  require_best_responses(pattern, hessian, shape);
+  if (!converged || !is_finite(x)) fail_to_converge();
   return x;
+}
+
+/// Newton's method with steps that are halved until the gradients become smaller.
+std::vector<Real> search_from(const Cost& cost, std::vector<Real> x) {
+  constexpr Real enough = 1e-12;
+  constexpr int most_halvings = 40;
+  const SparseRows& pattern = cost.hessian_pattern();
+  const std::size_t n = x.size();
+  std::vector<Real> hessian(at(pattern.entries()));
+  std::vector<Real> gradient(n);
+  std::vector<Real> trial(n);
+  cost.own_gradients(x.data(), 0, gradient.data());
+  if (!is_finite(gradient)) fail_to_converge();
+  for (int iteration = 0; iteration < most_iterations; ++iteration) {
+    cost.hessian_rows(x.data(), 0, hessian.data());
+    std::vector<Real> step = gradient;
+    solve_in_place(pattern, hessian, step);
+    if (!is_finite(step)) break;
+    if (largest_magnitude(step) <= enough * (1.0 + largest_magnitude(x))) {
+      for (std::size_t p = 0; p < n; ++p) x[p] -= step[p];
+      return x;
+    }
+    const Real before = norm(gradient);
+    Real share = 1.0;
+    for (int halving = 0;; ++halving, share *= 0.5) {
+      if (halving == most_halvings) fail_to_converge();
+      for (std::size_t p = 0; p < n; ++p) trial[p] = x[p] - share * step[p];
+      cost.own_gradients(trial.data(), 0, gradient.data());
+      if (is_finite(gradient) && norm(gradient) <= (1.0 - 0.1 * share) * before) break;
+    }
+    x = trial;
+  }
+  fail_to_converge();
+}
+
+}  // namespace
+
+std::vector<Real> nash_equilibrium(const Cost& cost, const Shape& shape, const std::vector<Real>& guess) {
+  const std::size_t n = at(shape.actions());
+  const auto accepted = [&](std::vector<Real> x) {
+    std::vector<Real> hessian(at(cost.hessian_pattern().entries()));
+    cost.hessian_rows(x.data(), 0, hessian.data());
+    require_best_responses(cost.hessian_pattern(), hessian, shape);
+    return x;
+  };
+  if (cost.is_affine()) return accepted(affine_equilibrium(cost, n));
+  std::exception_ptr first_failure;
+  std::vector<std::vector<Real>> starts;
+  if (!guess.empty()) starts.push_back(guess);
+  for (const Real everywhere : {0.0, 1.0, -1.0, 0.1, 10.0}) starts.emplace_back(n, everywhere);
+  for (const std::vector<Real>& start : starts) {
+    try {
+      return accepted(search_from(cost, start));
+    } catch (const GameError&) {
+      if (!first_failure) first_failure = std::current_exception();
+    }
+  }
+  std::rethrow_exception(first_failure);
 }
 
 // P(x*) = 0 at every cost, so that (dP/dx) dx* = -dP, the change of P at a fixed x

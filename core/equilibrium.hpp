@@ -10,10 +10,10 @@ namespace mixed_order_game {
 /// x*, at entry(i, l): the joint action at which every grad_i f_i vanishes and no own Hessian d^2 f_i / dx_i^2 has a
 /// negative eigenvalue. For quadratic costs the pseudo-gradient P(x) = (grad_1 f_1, ..., grad_N f_N) is affine,
 /// Newton's method takes one step and one more against rounding, and x* is a Nash equilibrium; for other costs, which
-/// take several steps, it is one if they are convex in the own action. Throws GameError when x* is not unique, that is
-/// when the Jacobian of P is singular whatever the units of its rows and columns; when a player's cost curves downwards
-/// along its own action; and when the steps do not converge.
-std::vector<Real> nash_equilibrium(const Cost& cost, const Shape& shape);
+/// take several steps from the guess and then from other starts, it is one if they are convex in the own action. Throws
+/// GameError when x* is not unique, that is when the Jacobian of P is singular whatever the units of its rows and
+/// columns; when a player's cost curves downwards along its own action; and when the steps do not converge.
+std::vector<Real> nash_equilibrium(const Cost& cost, const Shape& shape, const std::vector<Real>& guess = {});
 
 /// The derivative of x* with respect to the cost's coefficients, along those of a direction. Throws as
 /// nash_equilibrium().

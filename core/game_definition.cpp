@@ -3,8 +3,11 @@
 #include <set>
 
 #include "block_elimination.hpp"
+#include "definition/expression_reader.hpp"
 #include "equilibrium.hpp"
 #include "errors.hpp"
+#include "families/expression_disturbance.hpp"
+#include "families/expression_dynamics.hpp"
 #include "families/polynomial_dynamics.hpp"
 #include "families/quadratic_cost.hpp"
 #include "families/sinusoidal_disturbance.hpp"
@@ -149,7 +152,7 @@ void read_pairs(const TomlEntry& list, int players, std::string_view pair, Read 
 
 // Sets every coefficient of a family that the player's table has a key for.
 void read_coefficients(const TomlEntry& table, int i, const Shape& shape, Coefficients& coefficients) {
-  std::vector<std::string_view> keys;
+  std::vector<std::string_view> keys{"expression"};
   for (const Coefficient& declared : coefficients.declared()) {
     if (declared.key != nullptr) keys.emplace_back(declared.key);
   }
@@ -187,23 +190,80 @@ void read_coefficients(const TomlEntry& table, int i, const Shape& shape, Coeffi
   }
 }
 
-void read_initial_state(const TomlEntry& player, int i, const Shape& shape, InitialState& initial) {
-  const bool second = shape.is_second_order(i);
-  if (second && player["z0"].present()) player["z0"].fail("no z0 for a player of order 2, which has v0");
-  if (!second && player["v0"].present()) player["v0"].fail("no v0 for a player of order 1, which has z0");
-  player["x0"].numbers(shape.dimension, shape.players, &initial.x[at(i)]);
-  player[second ? "v0" : "z0"].numbers_if_present(shape.dimension, shape.players, &initial.reference[at(i)]);
+constexpr std::string_view player_keys[] = {"name", "order", "x0", "z0", "v0", "y0", "cost", "dynamics", "disturbance"};
 
-  const TomlEntry y0 = player["y0"];
+/// A player's own table before the defaults, key by key.
+class PlayerTable {
+ public:
+  PlayerTable(const TomlEntry& own, const TomlEntry& defaults) : own_(own), defaults_(defaults) {}
+
+  TomlEntry operator[](std::string_view key) const {
+    const TomlEntry own = own_[key];
+    return own.present() || !defaults_[key].present() ? own : defaults_[key];
+  }
+  /// Whether the player itself has the key.
+  bool has_own(std::string_view key) const { return own_[key].present(); }
+
+ private:
+  TomlEntry own_;
+  TomlEntry defaults_;
+};
+
+bool is_x0(const TomlEntry& entry) {
+  if (!entry.is_text()) return false;
+  if (entry.text() != "x0") entry.fail("numbers, or \"x0\" for the initial actions");
+  return true;
+}
+
+void read_actions(const PlayerTable& player, int i, const Shape& shape, InitialState& initial) {
+  const bool second = shape.is_second_order(i);
+  player["x0"].numbers(shape.dimension, shape.players, &initial.x[at(i)]);
+  // a default for players of the other order is none for this one
+  if (second && player.has_own("z0")) player["z0"].fail("no z0 for a player of order 2, which has v0");
+  if (!second && player.has_own("v0")) player["v0"].fail("no v0 for a player of order 1, which has z0");
+  const TomlEntry reference = player[second ? "v0" : "z0"];
+  if (!second && is_x0(reference)) {
+    for (int l = 0; l < shape.dimension; ++l) {
+      initial.reference[at(shape.entry(i, l))] = initial.x[at(shape.entry(i, l))];
+    }
+  } else {
+    reference.numbers_if_present(shape.dimension, shape.players, &initial.reference[at(i)]);
+  }
+}
+
+// After the actions of all players: estimates may begin there.
+void read_estimates(const TomlEntry& y0, int i, const Shape& shape, InitialState& initial) {
   Real* estimates = &initial.y[at(i) * at(shape.actions())];
+  if (is_x0(y0)) {
+    std::copy(initial.x.begin(), initial.x.end(), estimates);
+    return;
+  }
   if (!y0.is_list()) {
     std::fill_n(estimates, shape.actions(), y0.number_or(0.0));
     return;
   }
-  const std::string expected =
-      "a list of " + std::to_string(shape.players) + " estimates, one for each player, or one number";
-  if (y0.length(expected) != at(shape.players)) y0.fail(expected);
+  const std::string expected = "\"x0\", a list of " + std::to_string(shape.players) +
+                               " estimates, one for each player, a list of " + std::to_string(shape.dimension) +
+                               " numbers, or one number";
+  const std::size_t length = y0.length(expected);
+  if (length == at(shape.dimension) && shape.dimension > 1 && !y0.item(0).is_list()) {
+    for (int j = 0; j < shape.players; ++j) y0.numbers(shape.dimension, shape.players, estimates + j);
+    return;
+  }
+  if (length != at(shape.players)) y0.fail(expected);
   for (int j = 0; j < shape.players; ++j) y0.item(at(j)).numbers(shape.dimension, shape.players, estimates + j);
+}
+
+// Where the search for the equilibrium begins.
+std::vector<Real> read_guess(const TomlEntry& table, const Shape& shape, const InitialState& initial) {
+  table.accept_keys({"guess"});
+  std::vector<Real> guess = initial.x;
+  const TomlEntry list = table["guess"];
+  if (!list.present()) return guess;
+  const std::string expected = "a list of " + std::to_string(shape.players) + " actions, one for each player";
+  if (list.length(expected) != at(shape.players)) list.fail(expected);
+  for (int i = 0; i < shape.players; ++i) list.item(at(i)).numbers(shape.dimension, shape.players, &guess[at(i)]);
+  return guess;
 }
 
 // Number of variables when everything is exposed.
@@ -244,39 +304,70 @@ std::vector<std::string> read_names(const TomlEntry& players, int count) {
   return names;
 }
 
+bool has_any(const std::vector<ExpressionCost::Text>& texts) {
+  return std::any_of(texts.begin(), texts.end(), [](const auto& text) { return text.graph != nullptr; });
+}
+
+/// The family of the coefficients alone, or the one with expressions, where there are any.
+template <typename Interface, typename WithExpressions, typename Coefficients, typename... Expressions>
+Cloned<Interface> family_of(Coefficients coefficients, bool has_expressions, const Expressions&... expressions) {
+  if (has_expressions) {
+    return Cloned<Interface>(std::make_unique<WithExpressions>(std::move(coefficients), expressions...));
+  }
+  return Cloned<Interface>(std::make_unique<Coefficients>(std::move(coefficients)));
+}
+
 }  // namespace
 
 Game parse_game(std::string_view toml) {
   const toml::table document = parse_toml(toml);
   const TomlEntry game(document);
-  game.accept_keys({"title", "dimension", "expose", "strategy", "gains", "rbf", "graph", "player"});
+  game.accept_keys({"title", "dimension", "expose", "strategy", "gains", "rbf", "graph", "parameters", "defaults",
+                    "equilibrium", "player"});
   const std::string title = game["title"].text();
   const TomlEntry rbf = game["rbf"];
   rbf.accept_keys({"centers", "width", "W_max"});
   Shape shape = read_shape(game);
   const int n = shape.actions();
 
-  const TomlEntry players = game["player"];
+  const TomlEntry tables = game["player"];
+  const TomlEntry defaults = game["defaults"];
+  defaults.accept_keys(std::span(player_keys).subspan(1));  // a name is a player's own
+  std::vector<PlayerTable> players;
   for (int i = 0; i < shape.players; ++i) {
-    const TomlEntry player = players.item(at(i));
-    player.accept_keys({"name", "order", "x0", "z0", "v0", "y0", "cost", "dynamics", "disturbance"});
-    shape.order.push_back(player["order"].integer(1, 2));
+    tables.item(at(i)).accept_keys(player_keys);
+    players.emplace_back(tables.item(at(i)), defaults);
+    shape.order.push_back(players.back()["order"].integer(1, 2));
   }
-  const std::vector<std::string> names = read_names(players, shape.players);
+  const std::vector<std::string> names = read_names(tables, shape.players);
 
+  NamedParameters named = read_named_parameters(game["parameters"]);
+  const ExpressionReader expressions(toml, shape, named);
   QuadraticCost cost(shape.players, shape.dimension);
   PolynomialDynamics dynamics(shape.players, shape.dimension);
   SinusoidalDisturbance disturbance(shape.players, shape.dimension);
+  std::vector<ExpressionCost::Text> costs;
+  const PlayerExpressions none(n, shape.players, n, static_cast<int>(named.values.size()));
+  PlayerExpressions dynamics_values = none;
+  PlayerExpressions disturbance_values = none;
   InitialState initial{.x = std::vector<Real>(at(n)),
                        .reference = std::vector<Real>(at(n)),
                        .y = std::vector<Real>(at(shape.players) * at(n))};
   for (int i = 0; i < shape.players; ++i) {
-    const TomlEntry player = players.item(at(i));
-    read_initial_state(player, i, shape, initial);
+    const PlayerTable& player = players[at(i)];
+    read_actions(player, i, shape, initial);
     read_coefficients(player["cost"], i, shape, cost.coefficients);
     read_coefficients(player["dynamics"], i, shape, dynamics.coefficients);
     read_coefficients(player["disturbance"], i, shape, disturbance.coefficients);
+    costs.push_back(expressions.cost(player["cost"]["expression"], i));
+    expressions.add_coordinates(player["dynamics"]["expression"], Purpose::dynamics, i, dynamics_values);
+    expressions.add_coordinates(player["disturbance"]["expression"], Purpose::disturbance, i, disturbance_values);
   }
+  for (int i = 0; i < shape.players; ++i) read_estimates(players[at(i)]["y0"], i, shape, initial);
+  dynamics_values.compile();
+  disturbance_values.compile();
+  cost.coefficients.named = dynamics.coefficients.named = disturbance.coefficients.named = named.values;
+  dynamics.refresh();
 
   Game read{.title = title,
             .expose = Expose::all,
@@ -286,13 +377,17 @@ Game parse_game(std::string_view toml) {
                            .strategy = read_strategy(game["strategy"]),
                            .rbf = read_network(rbf, shape),
                            .graph = read_graph(game["graph"], shape.players),
-                           .cost = Cloned<Cost>(cost.clone()),
-                           .dynamics = Cloned<UnknownDynamics>(dynamics.clone()),
-                           .disturbance = Cloned<Disturbance>(disturbance.clone()),
-                           .initial = std::move(initial)}};
+                           .cost = family_of<Cost, ExpressionCost>(std::move(cost), has_any(costs), shape, costs),
+                           .dynamics = family_of<UnknownDynamics, ExpressionDynamics>(
+                               std::move(dynamics), !dynamics_values.empty(), shape, dynamics_values),
+                           .disturbance = family_of<Disturbance, ExpressionDisturbance>(
+                               std::move(disturbance), !disturbance_values.empty(), disturbance_values),
+                           .initial = std::move(initial),
+                           .named = std::move(named)}};
+  read.parameters.guess = read_guess(game["equilibrium"], shape, read.parameters.initial);
   read.expose = read_expose(game["expose"], shape, read.parameters.rbf.diagonal);
   read.parameters.refresh();
-  nash_equilibrium(*read.parameters.cost, shape);  // throws when it is not unique
+  nash_equilibrium(*read.parameters.cost, shape, read.parameters.guess);  // throws when it is not unique
   return read;
 }
 

@@ -20,6 +20,7 @@ void LoopJacobian::refresh() {
   const Parameters& parameters = loop_->parameters();
   hessian.resize(at(parameters.cost->hessian_pattern().entries()));
   dynamics.resize(at(parameters.dynamics->jacobian_pattern().entries()));
+  dynamics_by_velocity.resize(at(parameters.dynamics->velocity_pattern().entries()));
 }
 
 void LoopJacobian::linearize(const Real* state, const Signals& signals, const Modes& modes) {
@@ -29,9 +30,11 @@ void LoopJacobian::linearize(const Real* state, const Signals& signals, const Mo
   std::copy_n(state + layout.estimates(), estimates.size(), estimates.begin());
   parameters.cost->hessian_rows(estimates.data(), n, hessian.data());
   if (parameters.strategy.perturbed) {
-    parameters.dynamics->jacobian(state + layout.x(), dynamics.data());
+    parameters.dynamics->jacobian(state + layout.x(), state + layout.reference(), dynamics.data());
+    parameters.dynamics->velocity_jacobian(state + layout.x(), state + layout.reference(), dynamics_by_velocity.data());
   } else {
     std::fill(dynamics.begin(), dynamics.end(), 0.0);
+    std::fill(dynamics_by_velocity.begin(), dynamics_by_velocity.end(), 0.0);
   }
   std::copy(signals.error.begin(), signals.error.end(), error.begin());
   std::copy(signals.network.begin(), signals.network.end(), network.begin());

@@ -18,15 +18,16 @@ class LoopJacobian {
   [[nodiscard]] const ClosedLoop& loop() const { return *loop_; }
 
   /// The numbers it is made of, indexed by entry(i, l) unless said otherwise.
-  AlignedVector estimates;      ///< y
-  AlignedVector weights;        ///< W
-  AlignedVector activation;     ///< S
-  AlignedVector error;          ///< e
-  AlignedVector network;        ///< w'S
-  AlignedVector slope;          ///< d phi / d e
-  AlignedVector inverse_bound;  ///< 1 / W_max on the sphere while e w'S >= 0, else 0
-  AlignedVector hessian;        ///< along Cost::hessian_pattern()
-  AlignedVector dynamics;       ///< along UnknownDynamics::jacobian_pattern(); zero when not perturbed
+  AlignedVector estimates;             ///< y
+  AlignedVector weights;               ///< W
+  AlignedVector activation;            ///< S
+  AlignedVector error;                 ///< e
+  AlignedVector network;               ///< w'S
+  AlignedVector slope;                 ///< d phi / d e
+  AlignedVector inverse_bound;         ///< 1 / W_max on the sphere while e w'S >= 0, else 0
+  AlignedVector hessian;               ///< along Cost::hessian_pattern()
+  AlignedVector dynamics;              ///< along UnknownDynamics::jacobian_pattern(); zero when not perturbed
+  AlignedVector dynamics_by_velocity;  ///< along UnknownDynamics::velocity_pattern(); likewise
 
  private:
   const ClosedLoop* loop_;

@@ -6,6 +6,7 @@
 
 #include "cloned.hpp"
 #include "communication_graph.hpp"
+#include "expression/named_parameters.hpp"
 #include "families/cost.hpp"
 #include "families/disturbance.hpp"
 #include "families/unknown_dynamics.hpp"
@@ -52,6 +53,8 @@ struct Parameters {
   Cloned<UnknownDynamics> dynamics;
   Cloned<Disturbance> disturbance;
   InitialState initial;
+  NamedParameters named = {};
+  std::vector<Real> guess = {};  ///< where the search for the Nash equilibrium begins, entry(i, l)
 
   /// Whatever declares coefficients, in the order of the variables.
   [[nodiscard]] std::array<GameFamily*, 3> families() { return {&*cost, &*dynamics, &*disturbance}; }
@@ -64,7 +67,8 @@ struct Parameters {
     zero.rbf.width = zero.rbf.W_max = 0.0;
     zero.graph = CommunicationGraph(shape.players);
     for (GameFamily* family : zero.families()) family->coefficients.set_all_to_zero();
-    for (std::vector<Real>* values : {&zero.rbf.centers, &zero.initial.x, &zero.initial.reference, &zero.initial.y}) {
+    for (std::vector<Real>* values :
+         {&zero.rbf.centers, &zero.initial.x, &zero.initial.reference, &zero.initial.y, &zero.named.values}) {
       values->assign(values->size(), 0.0);
     }
     return zero;
@@ -73,7 +77,10 @@ struct Parameters {
   /// Rebuilds what is derived from coefficients; called after any of them changed.
   void refresh() {
     graph.refresh();
-    for (GameFamily* family : families()) family->refresh();
+    for (GameFamily* family : families()) {
+      family->coefficients.named = named.values;
+      family->refresh();
+    }
   }
 };
 

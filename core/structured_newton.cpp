@@ -79,6 +79,7 @@ class StructuredNewton final : public NewtonSolver {
   AlignedVector gradient_;  // Hessian rows times dy
   AlignedVector error_change_, from_error_, onto_weight_;
   AlignedVector activation_change_;
+  AlignedVector velocity_;  // b_x, then dv
 };
 
 void StructuredNewton::refresh(const LoopJacobian& jacobian) {
@@ -105,7 +106,7 @@ void StructuredNewton::refresh(const LoopJacobian& jacobian) {
   for (AlignedVector* vector :
        {&stiffness_, &inverse_driven_, &inverse_a2_, &inverse_a1_, &squares_, &network_gain_, &activation_per_error_,
         &weight_per_error_, &activation_share_, &weight_per_network_, &network_rhs_, &shared_, &gradient_,
-        &error_change_, &from_error_, &onto_weight_, &kappa_dS_}) {
+        &error_change_, &from_error_, &onto_weight_, &kappa_dS_, &velocity_}) {
     vector->assign(n, 0.0);
   }
   ones_.assign(at(std::max(n_, shape.neurons)), 1.0);
@@ -135,6 +136,10 @@ void StructuredNewton::refresh(const LoopJacobian& jacobian) {
     for (int k = dynamics.start[at(p)]; k < dynamics.start[at(p + 1)]; ++k) {
       const int column = dynamics.column[at(k)];
       rows[at(driven)].push_back(second_[at(column)] != 0 ? column : first_order_[at(column)]);
+    }
+    const SparseRows& by_velocity = parameters.dynamics->velocity_pattern();
+    for (int k = by_velocity.start[at(p)]; k < by_velocity.start[at(p + 1)]; ++k) {
+      rows[at(driven)].push_back(by_velocity.column[at(k)]);
     }
   }
   core_ = coupled() ? make_dense_core(unknowns) : make_sparse_core(rows);
@@ -241,6 +246,11 @@ void StructuredNewton::factor_core() {
       core_->add(driven, second_[at(column)] != 0 ? column : first_order_[at(column)],
                  -weight * jacobian_->dynamics[at(k)]);
     }
+    // dv = (dx - b_x) / gamma
+    const SparseRows& by_velocity = parameters.dynamics->velocity_pattern();
+    for (int k = by_velocity.start[at(p)]; k < by_velocity.start[at(p + 1)]; ++k) {
+      core_->add(driven, by_velocity.column[at(k)], -(second ? gamma_ : 1.0) * jacobian_->dynamics_by_velocity[at(k)]);
+    }
     if (!coupled()) continue;
     const Real* y = jacobian_->estimates.data() + i * n_;
     for (int k = 0; k < n_; ++k) {
@@ -329,14 +339,26 @@ void StructuredNewton::solve(Real* b) {
   }
 
   // core
+  const auto along_velocities = [&](int p, const Real* dv) {
+    const SparseRows& by_velocity = parameters.dynamics->velocity_pattern();
+    Real dg = 0.0;
+    for (int k = by_velocity.start[at(p)]; k < by_velocity.start[at(p + 1)]; ++k) {
+      dg += jacobian_->dynamics_by_velocity[at(k)] * dv[by_velocity.column[at(k)]];
+    }
+    return dg;
+  };
+  const bool has_velocities = parameters.dynamics->velocity_pattern().entries() != 0;
+  if (has_velocities) std::copy_n(dx, n_, velocity_.begin());
   for (const int p : velocity_driven_) {
     core_rhs_[at(shared_place_[at(p)])] = dreference[p] - gamma_ * k2 * gradient_[at(p)];
     core_rhs_[at(action_place_[at(p)])] = dx[p] - gamma_ * (h[p] + kappa_dS[p]);
+    if (has_velocities) core_rhs_[at(action_place_[at(p)])] -= along_velocities(p, velocity_.data());
   }
   for (const int p : accelerated_) {
     const Real B = stiffness_[at(p)];
     const Real known = h[p] + kappa_dS[p] + B * k2 * gradient_[at(p)];
     core_rhs_[at(shared_place_[at(p)])] = (1.0 + gamma_ * B) * dx[p] + gamma_ * (dreference[p] - gamma_ * known);
+    if (has_velocities) core_rhs_[at(shared_place_[at(p)])] -= gamma_ * along_velocities(p, velocity_.data());
   }
   core_->solve(core_rhs_.data());
 
@@ -344,6 +366,9 @@ void StructuredNewton::solve(Real* b) {
   for (int p = 0; p < n_; ++p) {
     shared_[at(p)] = core_rhs_[at(shared_place_[at(p)])];
     dx[p] = core_rhs_[at(action_place_[at(p)])];
+  }
+  if (has_velocities) {
+    for (int p = 0; p < n_; ++p) velocity_[at(p)] = (dx[p] - velocity_[at(p)]) / gamma_;
   }
   kernel.add_shared_signal(shape.players, shape.dimension, blocks_.shared_signal_gain().data(), shared_.data(), dy);
   if (coupled()) {
@@ -360,6 +385,7 @@ void StructuredNewton::solve(Real* b) {
     for (int k = dynamics.start[at(p)]; k < dynamics.start[at(p + 1)]; ++k) {
       dg += jacobian_->dynamics[at(k)] * dx[dynamics.column[at(k)]];
     }
+    if (has_velocities) dg += along_velocities(p, velocity_.data());
     const Real push = h[p] + kappa_dS[p] + stiffness_[at(p)] * k2 * gradient_[at(p)] - dg;
     dreference[p] = (dreference[p] - gamma_ * push) * inverse_driven_[at(p)];
     error_change_[at(p)] = dreference[p] + k2 * gradient_[at(p)];

@@ -190,6 +190,51 @@ std::string TomlEntry::text() const {
   return value->get();
 }
 
+std::vector<std::string> TomlEntry::keys(std::string_view expected) const {
+  std::vector<std::string> names;
+  if (!present()) return names;
+  if (!node_->is_table()) fail(expected);
+  for (const auto& [key, value] : *node_->as_table()) names.emplace_back(key.str());
+  // as the file has them, so that variables come in that order
+  std::sort(names.begin(), names.end(), [&](const std::string& a, const std::string& b) {
+    const toml::table& table = *node_->as_table();
+    const auto place = [&](const std::string& name) {
+      const toml::source_position& at_key = table.find(name)->first.source().begin;
+      return std::pair(at_key.line, at_key.column);
+    };
+    return place(a) < place(b);
+  });
+  return names;
+}
+
+std::string TomlEntry::multi_line_text() const {
+  if (!is_text()) fail("text");
+  return node_->as_string()->get();
+}
+
+std::pair<std::size_t, std::size_t> TomlEntry::place_of(std::string_view document, std::size_t position) const {
+  const toml::source_position begin = node_->source().begin;
+  std::size_t line = begin.line;
+  std::size_t column = begin.column;
+  std::size_t start = 0;  // of the line in the document
+  for (std::size_t k = 1; k < line; ++k) start = document.find('\n', start) + 1;
+  const std::string_view quote = document.substr(std::min(start + column - 1, document.size()), 3);
+  column += quote == "\"\"\"" || quote == "'''" ? 3 : 1;
+  const std::string text = multi_line_text();
+  if (column - begin.column == 3) {  // a line break right after the quotation marks is not part of the text
+    const char next = document[std::min(start + column - 1, document.size() - 1)];
+    if (next == '\n' || next == '\r') {
+      ++line;
+      column = 1;
+    }
+  }
+  for (std::size_t k = 0; k < position && k < text.size(); ++k) {
+    column = text[k] == '\n' ? 1 : column + 1;
+    if (text[k] == '\n') ++line;
+  }
+  return {line, column};
+}
+
 Real TomlEntry::finite(std::string_view expected) const {
   if (!present() || !node_->is_number()) fail(expected);
   const auto* integer = node_->as_integer();

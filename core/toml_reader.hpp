@@ -6,6 +6,8 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
+#include <vector>
 
 // nesting beyond that of any game is refused, so that a hostile document cannot exhaust the stack
 #define TOML_MAX_NESTED_VALUES 32
@@ -39,11 +41,19 @@ class TomlEntry {
   /// Entry k, counted from zero, of this list.
   [[nodiscard]] TomlEntry item(std::size_t k) const;
   [[nodiscard]] bool is_list() const { return present() && node_->is_array(); }
+  [[nodiscard]] bool is_table() const { return present() && node_->is_table(); }
+  [[nodiscard]] bool is_text() const { return present() && node_->is_string(); }
+  /// The keys of this table; an absent table has none.
+  [[nodiscard]] std::vector<std::string> keys(std::string_view expected) const;
 
   [[nodiscard]] bool boolean() const;
   [[nodiscard]] int integer(int lowest, int highest) const;
   /// Text in one line.
   [[nodiscard]] std::string text() const;
+  /// Text in any number of lines.
+  [[nodiscard]] std::string multi_line_text() const;
+  /// Line and column in the document, from one, of a position in this entry's text.
+  [[nodiscard]] std::pair<std::size_t, std::size_t> place_of(std::string_view document, std::size_t position) const;
   /// A finite number; an integer will do.
   [[nodiscard]] Real number() const { return finite("a finite number"); }
   [[nodiscard]] Real number_or(Real absent) const { return present() ? number() : absent; }

@@ -40,6 +40,9 @@ class Coefficients {
  public:
   Coefficients(std::span<const Coefficient> declared, int players, int dimension);
 
+  /// The game's named parameters, which expressions use; equal for all families.
+  std::vector<Real> named;
+
   [[nodiscard]] std::span<const Coefficient> declared() const { return declared_; }
   /// Number of slots of a coefficient.
   [[nodiscard]] int slots(Indices indices) const;
@@ -70,6 +73,8 @@ class CoefficientsAs {
   [[nodiscard]] virtual Scalar value(int number, int slot) const = 0;
   /// Whether it is zero whatever happens, so that its term can be left out.
   [[nodiscard]] virtual bool vanishes(int number, int slot) const = 0;
+  /// The named parameter at a slot.
+  [[nodiscard]] virtual Scalar named(int slot) const = 0;
 };
 
 /// Coefficients with those of a direction as derivatives.
@@ -85,6 +90,9 @@ class CoefficientsAlong final : public CoefficientsAs<Dual> {
   [[nodiscard]] bool vanishes(int number, int slot) const override {
     const Dual both = value(number, slot);
     return both.value == 0.0 && both.along == 0.0;
+  }
+  [[nodiscard]] Dual named(int slot) const override {
+    return {values_.named[at(slot)], direction_ == nullptr ? 0.0 : direction_->named[at(slot)]};
   }
 
  private:

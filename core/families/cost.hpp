@@ -32,6 +32,9 @@ class Cost : public GameFamily {
 
   /// The entries of hessian_pattern(), row entry(i, l) at the joint action points + i * stride.
   virtual void hessian_rows(const Real* points, int stride, Real* values) const = 0;
+
+  /// Whether the gradients are affine, so that the Hessian is the same everywhere.
+  [[nodiscard]] virtual bool is_affine() const = 0;
 };
 
 }  // namespace mixed_order_game

@@ -21,6 +21,7 @@ constexpr Coefficient declared[] = {
 PolynomialDynamics::PolynomialDynamics(int players, int dimension)
     : UnknownDynamics(Coefficients(declared, players, dimension)), players_(players) {
   pattern_.start.assign(at(players * dimension + 1), 0);
+  no_velocities_ = pattern_;
 }
 
 std::unique_ptr<UnknownDynamics> PolynomialDynamics::clone() const {
@@ -60,19 +61,20 @@ void PolynomialDynamics::values_as(const Scalar* x, Gain gain_of, Scalar* g) con
   }
 }
 
-void PolynomialDynamics::values(const Real* x, Real* g) const {
+void PolynomialDynamics::values(const Real* x, const Real* /*v*/, Real* g) const {
   values_as(x, [&](int i) { return coefficients[gain][at(i)]; }, g);
 }
 
-void PolynomialDynamics::values(const CoefficientsAs<Dual>& along, const Dual* x, Dual* g) const {
+void PolynomialDynamics::values(const CoefficientsAs<Dual>& along, const Dual* x, const Dual* /*v*/, Dual* g) const {
   values_as(x, [&](int i) { return along.value(gain, i); }, g);
 }
 
-void PolynomialDynamics::values(const CoefficientsAs<Dependencies>& of, const Dependencies* x, Dependencies* g) const {
+void PolynomialDynamics::values(const CoefficientsAs<Dependencies>& of, const Dependencies* x,
+                                const Dependencies* /*v*/, Dependencies* g) const {
   values_as(x, [&](int i) { return of.value(gain, i); }, g);
 }
 
-void PolynomialDynamics::jacobian(const Real* x, Real* values) const {
+void PolynomialDynamics::jacobian(const Real* x, const Real* /*v*/, Real* values) const {
   for (int row = 0; row < pattern_.rows(); ++row) {
     for (int k = pattern_.start[at(row)]; k < pattern_.start[at(row + 1)]; ++k) {
       const Real xj = x[pattern_.column[at(k)]];

@@ -5,7 +5,7 @@
 
 namespace mixed_order_game {
 
-class PolynomialDynamics final : public UnknownDynamics {
+class PolynomialDynamics : public UnknownDynamics {
  public:
   enum Number { linear, square, gain };  ///< G_ijl, H_ijl, gain_i
 
@@ -13,11 +13,14 @@ class PolynomialDynamics final : public UnknownDynamics {
 
   [[nodiscard]] std::unique_ptr<UnknownDynamics> clone() const override;
   void refresh() override;
-  void values(const Real* x, Real* g) const override;
-  void values(const CoefficientsAs<Dual>& along, const Dual* x, Dual* g) const override;
-  void values(const CoefficientsAs<Dependencies>& of, const Dependencies* x, Dependencies* g) const override;
+  void values(const Real* x, const Real* v, Real* g) const override;
+  void values(const CoefficientsAs<Dual>& along, const Dual* x, const Dual* v, Dual* g) const override;
+  void values(const CoefficientsAs<Dependencies>& of, const Dependencies* x, const Dependencies* v,
+              Dependencies* g) const override;
   [[nodiscard]] const SparseRows& jacobian_pattern() const override { return pattern_; }
-  void jacobian(const Real* x, Real* values) const override;
+  void jacobian(const Real* x, const Real* v, Real* values) const override;
+  [[nodiscard]] const SparseRows& velocity_pattern() const override { return no_velocities_; }
+  void velocity_jacobian(const Real* /*x*/, const Real* /*v*/, Real* /*values*/) const override {}
 
  private:
   template <typename Scalar, typename Gain>
@@ -25,6 +28,7 @@ class PolynomialDynamics final : public UnknownDynamics {
 
   int players_;
   SparseRows pattern_;
+  SparseRows no_velocities_;
   std::vector<Real> linear_;  // along pattern_
   std::vector<Real> square_;
 };

@@ -5,7 +5,7 @@
 
 namespace mixed_order_game {
 
-class QuadraticCost final : public Cost {
+class QuadraticCost : public Cost {
  public:
   enum Number { quadratic, linear, constant, coupling };  ///< q_i, l_il, const_i, c_ij
 
@@ -20,6 +20,7 @@ class QuadraticCost final : public Cost {
                      Dependencies* gradient) const override;
   [[nodiscard]] const SparseRows& hessian_pattern() const override { return pattern_; }
   void hessian_rows(const Real* points, int stride, Real* values) const override;
+  [[nodiscard]] bool is_affine() const override { return true; }
 
  private:
   template <typename Scalar>

@@ -5,7 +5,7 @@
 
 namespace mixed_order_game {
 
-class SinusoidalDisturbance final : public Disturbance {
+class SinusoidalDisturbance : public Disturbance {
  public:
   enum Number { amplitude, frequency, phase, bias };  ///< all at entry(i, l); frequency in rad/s, phase in rad
 

@@ -16,4 +16,8 @@ struct SparseRows {
   [[nodiscard]] int entries() const { return static_cast<int>(column.size()); }
 };
 
+/// The pattern that holds two others of as many rows, and where their entries lie in it.
+void unite(const SparseRows& a, const SparseRows& b, SparseRows& both, std::vector<int>& place_of_a,
+           std::vector<int>& place_of_b);
+
 }  // namespace mixed_order_game

@@ -1,4 +1,5 @@
-// Unknown dynamics g_i(x) of the plants, as the closed loop sees them: values and Jacobian rows.
+// Unknown dynamics g_i(x, v) of the plants, as the closed loop sees them: values and Jacobian rows. Vectors have N D
+// entries; of v those of second-order players count.
 #pragma once
 
 #include <memory>
@@ -15,17 +16,21 @@ class UnknownDynamics : public GameFamily {
   using GameFamily::GameFamily;
   [[nodiscard]] virtual std::unique_ptr<UnknownDynamics> clone() const = 0;
 
-  /// g[entry(i, l)] = g_il(x); both of length N D.
-  virtual void values(const Real* x, Real* g) const = 0;
-  virtual void values(const CoefficientsAs<Dual>& coefficients, const Dual* x, Dual* g) const = 0;
-  virtual void values(const CoefficientsAs<Dependencies>& coefficients, const Dependencies* x,
+  /// g[entry(i, l)] = g_il(x, v).
+  virtual void values(const Real* x, const Real* v, Real* g) const = 0;
+  virtual void values(const CoefficientsAs<Dual>& coefficients, const Dual* x, const Dual* v, Dual* g) const = 0;
+  virtual void values(const CoefficientsAs<Dependencies>& coefficients, const Dependencies* x, const Dependencies* v,
                       Dependencies* g) const = 0;
 
   /// Row entry(i, l): the columns entry(j, h) at which d g_il / d x_jh may differ from zero.
   [[nodiscard]] virtual const SparseRows& jacobian_pattern() const = 0;
 
-  /// The entries of jacobian_pattern() at x.
-  virtual void jacobian(const Real* x, Real* values) const = 0;
+  /// The entries of jacobian_pattern().
+  virtual void jacobian(const Real* x, const Real* v, Real* values) const = 0;
+
+  /// The same along v.
+  [[nodiscard]] virtual const SparseRows& velocity_pattern() const = 0;
+  virtual void velocity_jacobian(const Real* x, const Real* v, Real* values) const = 0;
 };
 
 }  // namespace mixed_order_game

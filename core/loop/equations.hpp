@@ -95,7 +95,7 @@ void LoopEquations<Scalar>::evaluate_rates(const LoopNumbers<Scalar>& number, co
                                            const Scalar* d_ext, const Modes& modes, Scalar* rate) {
   const Shape& shape = parameters_.shape;
   const int n = shape.actions();
-  parameters_.dynamics->values(*number.dynamics, state + layout.x(), dynamics.data());
+  parameters_.dynamics->values(*number.dynamics, state + layout.x(), state + layout.reference(), dynamics.data());
   parameters_.disturbance->values(*number.disturbance, t, disturbance.data());
   for (int p = 0; p < n; ++p) {
     const int i = shape.player_of(p);

@@ -1,0 +1,63 @@
+#include "families/expression_dynamics.hpp"
+
+#include <algorithm>
+
+namespace mixed_order_game {
+
+ExpressionDynamics::ExpressionDynamics(PolynomialDynamics coefficients_of, const Shape& shape, PlayerExpressions values)
+    : PolynomialDynamics(std::move(coefficients_of)), players_(shape.players), values_(std::move(values)) {
+  unite(PolynomialDynamics::jacobian_pattern(), values_.pattern(LeafKind::action), pattern_, polynomial_place_,
+        expression_place_);
+}
+
+void ExpressionDynamics::values(const Real* x, const Real* v, Real* g) const {
+  PolynomialDynamics::values(x, v, g);
+  scratch_.assign(at(pattern_.rows()), 0.0);
+  values_.values(leaves(x, v), scratch_.data());
+  for (int p = 0; p < pattern_.rows(); ++p) g[p] += coefficients[gain][at(p % players_)] * scratch_[at(p)];
+}
+
+template <typename Scalar>
+void ExpressionDynamics::add_expressions(const CoefficientsAs<Scalar>& of, const Scalar* x, const Scalar* v,
+                                         Scalar* g) const {
+  std::vector<Scalar> values(at(pattern_.rows()));
+  values_.add_values({.points = x, .stride = 0, .velocities = v, .coefficients = &of}, values.data());
+  for (int p = 0; p < pattern_.rows(); ++p) g[p] += of.value(gain, p % players_) * values[at(p)];
+}
+
+void ExpressionDynamics::values(const CoefficientsAs<Dual>& along, const Dual* x, const Dual* v, Dual* g) const {
+  PolynomialDynamics::values(along, x, v, g);
+  add_expressions(along, x, v, g);
+}
+
+void ExpressionDynamics::values(const CoefficientsAs<Dependencies>& of, const Dependencies* x, const Dependencies* v,
+                                Dependencies* g) const {
+  PolynomialDynamics::values(of, x, v, g);
+  add_expressions(of, x, v, g);
+}
+
+void ExpressionDynamics::jacobian(const Real* x, const Real* v, Real* values) const {
+  std::fill_n(values, pattern_.entries(), 0.0);
+  scratch_.resize(std::max(polynomial_place_.size(), expression_place_.size()));
+  PolynomialDynamics::jacobian(x, v, scratch_.data());
+  for (std::size_t k = 0; k < polynomial_place_.size(); ++k) values[polynomial_place_[k]] += scratch_[k];
+  const SparseRows& expressions = values_.pattern(LeafKind::action);
+  values_.derivatives(LeafKind::action, leaves(x, v), scratch_.data());
+  for (int p = 0; p < expressions.rows(); ++p) {
+    for (int k = expressions.start[at(p)]; k < expressions.start[at(p + 1)]; ++k) {
+      values[expression_place_[at(k)]] += coefficients[gain][at(p % players_)] * scratch_[at(k)];
+    }
+  }
+}
+
+void ExpressionDynamics::velocity_jacobian(const Real* x, const Real* v, Real* values) const {
+  const SparseRows& rows = velocity_pattern();
+  values_.derivatives(LeafKind::velocity, leaves(x, v), values);
+  for (int p = 0; p < rows.rows(); ++p) {
+    for (int k = rows.start[at(p)]; k < rows.start[at(p + 1)]; ++k) {
+      values[k] *= coefficients[gain][at(p % players_)];
+    }
+  }
+}
+
+}  // namespace mixed_order_game
