@@ -66,8 +66,8 @@ void Evaluation::event_indicators(const Standing& standing, Real tolerance, Real
 
 void Evaluation::prepare_equilibrium(Settings& settings) {
   if (equilibrium_valid_) return;
-  settings.parameters.cost->refresh();
-  x_star_ = nash_equilibrium(*settings.parameters.cost, settings.parameters.shape);
+  settings.parameters.refresh();
+  x_star_ = nash_equilibrium(*settings.parameters.cost, settings.parameters.shape, settings.parameters.guess);
   equilibrium_valid_ = true;
 }
 

@@ -73,7 +73,7 @@ void require_valid(const Experiment& experiment) {
   if (!std::isfinite(experiment.start_time)) {
     throw Error("the start time is " + text_of(experiment.start_time) + ", expected a finite number");
   }
-  if (experiment.tolerance && !(*experiment.tolerance > 0.0 && *experiment.tolerance <= *largest(Range::tolerance))) {
+  if (experiment.tolerance && !(*experiment.tolerance > 0.0 && *experiment.tolerance <= *Range::tolerance.largest)) {
     throw Error("the tolerance is " + text_of(*experiment.tolerance) + ", expected a positive number of at most 0.1");
   }
   if (experiment.stop_time &&
@@ -190,9 +190,9 @@ void Instance::set(Type type, std::span<const std::uint32_t> references, const R
     if (!may_be_set(family, phase_)) {
       throw Error(variables.name(reference) + " " + why_not_settable(family, phase_, interface_));
     }
-    if (!contains(family.range, values[k])) {
+    if (!family.range.contains(values[k])) {
       throw Error(variables.name(reference) + " was set to " + text_of(values[k]) + ", expected " +
-                  std::string(expectation(family.range)));
+                  family.range.expectation());
     }
     if (family.state >= 0) {
       state_set = true;

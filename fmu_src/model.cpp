@@ -18,7 +18,7 @@ std::string interface_guid(std::string_view toml, const Game& game, const ModelV
     fingerprint.add_number(static_cast<std::uint64_t>(family.count));
     for (const auto property :
          {static_cast<int>(family.type), static_cast<int>(family.causality), static_cast<int>(family.variability),
-          static_cast<int>(family.initial), static_cast<int>(family.range), family.derivative_of}) {
+          static_cast<int>(family.initial), static_cast<int>(family.range.kind), family.derivative_of}) {
       fingerprint.add_number(static_cast<std::uint64_t>(property));
     }
   }

@@ -4,6 +4,7 @@
 #include <charconv>
 #include <cmath>
 #include <limits>
+#include <set>
 
 #include "errors.hpp"
 #include "measures.hpp"
@@ -29,8 +30,6 @@ constexpr SimpleType declared[] = {
 
 constexpr Unit known_units[] = {{"1", 0, 0},     {"s", 1, 0},     {"1/s", -1, 0},   {"1/s2", -2, 0},
                                 {"1/s3", -3, 0}, {"1/s4", -4, 0}, {"rad/s", -1, 1}, {"rad", 0, 1}};
-
-constexpr Real no_tolerance_above = 0.1;
 
 // Accessors made from members, so that reading and setting name the same one.
 template <auto Member>
@@ -78,46 +77,16 @@ using Elements = std::vector<Element>;
 std::span<const SimpleType> simple_types() { return declared; }
 std::span<const Unit> units() { return known_units; }
 
-std::optional<Real> smallest(Range range) {
-  switch (range) {
-    case Range::any:
-      return std::nullopt;
-    case Range::non_negative:
-    case Range::tolerance:
-      return 0.0;
-    case Range::positive:
-      return std::numeric_limits<Real>::min();
-  }
-  return std::nullopt;
+bool Range::contains(Real value) const {
+  return std::isfinite(value) && value >= smallest.value_or(value) && value <= largest.value_or(value);
 }
 
-std::optional<Real> largest(Range range) {
-  if (range == Range::tolerance) return no_tolerance_above;
-  return std::nullopt;
-}
-
-bool contains(Range range, Real value) {
-  return std::isfinite(value) && value >= smallest(range).value_or(value) && value <= largest(range).value_or(value);
-}
-
-std::string_view expectation(Range range) {
-  switch (range) {
-    case Range::any:
-      return "a finite number";
-    case Range::non_negative:
-      return "a finite number of at least 0";
-    case Range::positive:
-      return "a positive finite number";
-    case Range::tolerance:
-      return "0 (not set) or a positive number of at most 0.1";
-  }
-  return "";
-}
-
-std::string text_of(Real value) {
-  char text[32];
-  const auto result = std::to_chars(text, text + sizeof text, value);
-  return {text, result.ptr};
+std::string Range::expectation() const {
+  if (!words.empty()) return std::string(words);
+  if (smallest && largest) return "a number from " + text_of(*smallest) + " to " + text_of(*largest);
+  if (smallest) return "a finite number of at least " + text_of(*smallest);
+  if (largest) return "a finite number of at most " + text_of(*largest);
+  return "a finite number";
 }
 
 /// Adds the families in the order of the table.
@@ -140,6 +109,7 @@ class ModelVariables::Builder {
     add_network();
     add_graph();
     add_coefficients();
+    add_named_parameters();
     add_switches();
     add_initial_state();
     add_tolerances();
@@ -147,6 +117,7 @@ class ModelVariables::Builder {
     add_outputs();
     add_inside_of_the_loop();
     add_solver();
+    require_distinct_names();
   }
 
  private:
@@ -245,6 +216,43 @@ class ModelVariables::Builder {
     family.game_family = static_cast<int>(game_family);
     family.coefficient = number;
     add(std::move(family), elements(declared.indices, game_.parameters.families()[game_family]->coefficients[number]));
+  }
+  // Those of the game file; their order is that of the file.
+  void add_named_parameters() {
+    for (const NamedParameter& named : game_.parameters.named.declared) {
+      if (named.fixed) continue;
+      if (table_.find(named.name) != nullptr) {
+        throw GameError("parameters." + named.name + " has the name of a variable, expected another name");
+      }
+      Family family = parameter(named.name.c_str(), named.description.c_str(), Variability::tunable);
+      family.declared_unit = named.unit;
+      family.range = {};
+      if (std::isfinite(named.min)) family.range.smallest = named.min;
+      if (std::isfinite(named.max)) family.range.largest = named.max;
+      family.moves_equilibrium = true;
+      family.is_named = true;
+      family.read = [](const View& view, int slot) { return view.settings->parameters.named.values[at(slot)]; };
+      family.write = [](Settings& settings, int slot, Real value) {
+        settings.parameters.named.values[at(slot)] = value;
+      };
+      Elements elements;
+      const int columns = named.size.size() == 2 ? named.size[1] : 1;
+      for (int k = 0; k < named.count(); ++k) {
+        Index index{};
+        if (!named.size.empty()) index[0] = k / columns + 1;
+        if (named.size.size() == 2) index[1] = k % columns + 1;
+        elements.push_back({named.first + k, index});
+      }
+      add(std::move(family), elements);
+    }
+  }
+  // A named parameter may have come before a variable of its name.
+  void require_distinct_names() const {
+    std::set<std::string_view> seen;
+    for (const Family& family : table_.families()) {
+      if (seen.insert(family.name).second) continue;
+      throw GameError("parameters." + family.name + " has the name of a variable, expected another name");
+    }
   }
   Elements elements(Indices indices, const std::vector<Real>& values) const {
     switch (indices) {
@@ -638,7 +646,8 @@ std::string ModelVariables::name(int reference) const {
 }
 
 const char* ModelVariables::unit(int reference) const {
-  const int player = variable(reference).index[0];
+  if (!family(reference).declared_unit.empty()) return family(reference).declared_unit.c_str();
+  const int player = family(reference).is_named ? 0 : variable(reference).index[0];
   return family(reference).unit[player > 0 && at(player) <= order_.size() && order_[at(player - 1)] == 2 ? 1 : 0];
 }
 
@@ -678,10 +687,9 @@ void ModelVariables::load(std::span<const Real> numbers, Settings& settings) con
 
 void ModelVariables::require_settable(std::span<const Real> numbers) const {
   for (std::size_t k = 0; k < settable_.size(); ++k) {
-    const Range range = family(settable_[k]).range;
-    if (contains(range, numbers[k])) continue;
-    throw Error("the saved " + name(settable_[k]) + " is " + text_of(numbers[k]) + ", expected " +
-                std::string(expectation(range)));
+    const Range& range = family(settable_[k]).range;
+    if (range.contains(numbers[k])) continue;
+    throw Error("the saved " + name(settable_[k]) + " is " + text_of(numbers[k]) + ", expected " + range.expectation());
   }
 }
 

@@ -7,12 +7,14 @@
 #include <array>
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <optional>
 #include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "number_text.hpp"
 #include "settings.hpp"
 
 namespace mixed_order_game {
@@ -22,8 +24,32 @@ enum class Causality : std::uint8_t { parameter, calculated_parameter, input, ou
 enum class Variability : std::uint8_t { constant, fixed, tunable, discrete, continuous };
 enum class Initial : std::uint8_t { none, exact, calculated };
 
-/// Which values may be set.
-enum class Range : std::uint8_t { any, non_negative, positive, tolerance };
+/// Which values may be set: finite ones within these bounds.
+struct Range {
+  enum class Kind : std::uint8_t { any, non_negative, positive, tolerance, bounds };
+
+  Kind kind = Kind::bounds;
+  std::optional<Real> smallest = std::nullopt;
+  std::optional<Real> largest = std::nullopt;
+  std::string_view words = {};  ///< as in "a positive finite number"; empty: made of the bounds
+
+  [[nodiscard]] bool contains(Real value) const;
+  [[nodiscard]] std::string expectation() const;
+
+  static const Range any;
+  static const Range non_negative;
+  static const Range positive;
+  static const Range tolerance;
+};
+inline const Range Range::any{.kind = Kind::any, .words = "a finite number"};
+inline const Range Range::non_negative{
+    .kind = Kind::non_negative, .smallest = 0.0, .words = "a finite number of at least 0"};
+inline const Range Range::positive{
+    .kind = Kind::positive, .smallest = std::numeric_limits<Real>::min(), .words = "a positive finite number"};
+inline const Range Range::tolerance{.kind = Kind::tolerance,
+                                    .smallest = 0.0,
+                                    .largest = 0.1,
+                                    .words = "0 (not set) or a positive number of at most 0.1"};
 
 /// Declared types of modelDescription.xml.
 struct SimpleType {
@@ -51,6 +77,7 @@ struct Family {
   Causality causality = Causality::local;
   Variability variability = Variability::continuous;
   Initial initial = Initial::calculated;
+  std::string declared_unit = {};  ///< of a named parameter, in place of unit
   const char* declared_type = nullptr;
   std::array<const char*, 2> unit{};  ///< for players of order 1 and of order 2; null: none
   Range range = Range::any;
@@ -71,8 +98,9 @@ struct Family {
   /// Change of the element at a slot along a tangent; empty unless the equations of the model determine it.
   std::function<Real(const View& view, const Tangent& tangent, int slot)> read_along = nullptr;
 
-  int game_family = -1;  ///< of coefficients: which of Parameters::families() declares it
-  int coefficient = -1;  ///< and its number there
+  bool is_named = false;  ///< named parameters: slots count their values
+  int game_family = -1;   ///< of coefficients: which of Parameters::families() declares it
+  int coefficient = -1;   ///< and its number there
 
   int first = 0;  ///< value references first .. first + count - 1
   int count = 0;
@@ -133,15 +161,5 @@ class ModelVariables {
   std::size_t input_numbers_ = 0;
   std::vector<int> order_;  // of the players
 };
-
-/// Smallest and largest value of a range, when it has one, as modelDescription.xml states it.
-std::optional<Real> smallest(Range range);
-std::optional<Real> largest(Range range);
-bool contains(Range range, Real value);
-/// As in "a positive number".
-std::string_view expectation(Range range);
-
-/// The shortest text that reads back as the same number.
-std::string text_of(Real value);
 
 }  // namespace mixed_order_game

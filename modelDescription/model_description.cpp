@@ -1,6 +1,7 @@
 #include "model_description.hpp"
 
 #include <pugixml.hpp>
+#include <set>
 #include <sstream>
 
 #include "fmi_logger.hpp"
@@ -80,7 +81,7 @@ void write_head(xml_node root, const Model& model) {
   attribute(co_simulation, "providesDirectionalDerivative", "true");
 }
 
-void write_definitions(xml_node root) {
+void write_definitions(xml_node root, const Model& model) {
   xml_node unit_definitions = root.append_child("UnitDefinitions");
   for (const Unit& unit : units()) {
     xml_node node = unit_definitions.append_child("Unit");
@@ -88,6 +89,13 @@ void write_definitions(xml_node root) {
     xml_node base = node.append_child("BaseUnit");
     if (unit.seconds != 0) attribute(base, "s", std::to_string(unit.seconds));
     if (unit.radians != 0) attribute(base, "rad", std::to_string(unit.radians));
+  }
+  // units of named parameters, of which only the name is known
+  std::set<std::string> seen;
+  for (const Unit& unit : units()) seen.insert(unit.name);
+  for (const Family& family : model.variables.families()) {
+    if (family.declared_unit.empty() || !seen.insert(family.declared_unit).second) continue;
+    attribute(unit_definitions.append_child("Unit"), "name", family.declared_unit);
   }
   xml_node type_definitions = root.append_child("TypeDefinitions");
   for (const SimpleType& type : simple_types()) {
@@ -139,8 +147,8 @@ void write_variables(xml_node root, const Model& model) {
     xml_node value = node.append_child(name_of(family.type));
     if (family.declared_type != nullptr) attribute(value, "declaredType", family.declared_type);
     if (const char* unit = variables.unit(reference); unit != nullptr) attribute(value, "unit", unit);
-    if (const auto min = smallest(family.range)) attribute(value, "min", text_of(*min));
-    if (const auto max = largest(family.range)) attribute(value, "max", text_of(*max));
+    if (const auto min = family.range.smallest) attribute(value, "min", text_of(*min));
+    if (const auto max = family.range.largest) attribute(value, "max", text_of(*max));
     if (family.nominal > 0.0) attribute(value, "nominal", text_of(family.nominal));
     if (family.initial == Initial::exact) {
       attribute(value, "start", start_of(family.type, variables.read(reference, view)));
@@ -180,7 +188,7 @@ std::string model_description(const Model& model) {
   attribute(declaration, "encoding", "UTF-8");
   xml_node root = document.append_child("fmiModelDescription");
   write_head(root, model);
-  write_definitions(root);
+  write_definitions(root, model);
   write_variables(root, model);
   const ModelStructure structure = model_structure(model);
   xml_node node = root.append_child("ModelStructure");

@@ -21,6 +21,7 @@ class Knowns {
       const Family& family = variables.family(reference);
       const int slot = variables.variable(reference).slot;
       references_[family.name][slot] = reference;
+      if (family.is_named) named_[slot] = reference;
       if (family.game_family >= 0) coefficients_[family.game_family][family.coefficient] = &references_[family.name];
     }
   }
@@ -36,6 +37,7 @@ class Knowns {
     const auto found = family->second.find(number);
     return found == family->second.end() ? Dependencies(value) : parameter(*found->second, slot, value);
   }
+  [[nodiscard]] Dependencies named(int slot, Real value) const { return parameter(named_, slot, value); }
   [[nodiscard]] Dependencies input(int slot) const { return Dependencies::known(references_.at("d_ext").at(slot)); }
   [[nodiscard]] Dependencies time() const { return Dependencies::known(references_.at("time").at(0)); }
 
@@ -50,6 +52,7 @@ class Knowns {
 
   Equations equations_;
   std::unordered_map<std::string, Slots> references_;
+  Slots named_;
   std::unordered_map<int, std::unordered_map<int, const Slots*>> coefficients_;
 };
 
@@ -65,6 +68,7 @@ class KnownCoefficients final : public CoefficientsAs<Dependencies> {
     const Dependencies coefficient = value(number, slot);
     return coefficient.number() == 0.0;
   }
+  [[nodiscard]] Dependencies named(int slot) const override { return knowns_.named(slot, values_.named[at(slot)]); }
 
  private:
   const Knowns& knowns_;

@@ -121,6 +121,7 @@ class GradientsOnly : public Cost {
   void own_gradients(const CoefficientsAs<Dependencies>& /*none*/, const Dependencies* /*points*/, int /*stride*/,
                      Dependencies* /*gradient*/) const override {}
   void refresh() override {}
+  [[nodiscard]] bool is_affine() const override { return false; }
 };
 
 /// Gradients J x + l, for any J.
@@ -184,18 +185,18 @@ TEST(NashEquilibrium, IsJudgedWhateverTheUnitsOfRowsAndColumns) {
   }
 }
 
-/// f_1' = x_1^3 - 2 x_1 + 2, at which Newton's method from 0 goes to 1 and back for ever, and f_2' = x_2.
-class CyclingCost final : public GradientsOnly {
+/// f_1' = exp(x_1), which vanishes nowhere, and f_2' = x_2.
+class RunawayCost final : public GradientsOnly {
  public:
-  CyclingCost() : GradientsOnly(2) {}
-  [[nodiscard]] std::unique_ptr<Cost> clone() const override { return std::make_unique<CyclingCost>(*this); }
+  RunawayCost() : GradientsOnly(2) {}
+  [[nodiscard]] std::unique_ptr<Cost> clone() const override { return std::make_unique<RunawayCost>(*this); }
   void own_gradients(const Real* points, int stride, Real* gradient) const override {
-    gradient[0] = points[0] * points[0] * points[0] - 2.0 * points[0] + 2.0;
+    gradient[0] = std::exp(points[0]);
     gradient[1] = points[stride + 1];
   }
   [[nodiscard]] const SparseRows& hessian_pattern() const override { return pattern_; }
   void hessian_rows(const Real* points, int /*stride*/, Real* values) const override {
-    values[0] = 3.0 * points[0] * points[0] - 2.0;
+    values[0] = std::exp(points[0]);
     values[1] = 1.0;
   }
 
@@ -206,7 +207,7 @@ class CyclingCost final : public GradientsOnly {
 TEST(NashEquilibrium, IsRefusedWhereTheStepsDoNotConverge) {
   const Shape shape{.players = 2, .dimension = 1, .neurons = 1, .order = {1, 1}};
   try {
-    nash_equilibrium(CyclingCost(), shape);
+    nash_equilibrium(RunawayCost(), shape);
     FAIL() << "it does not converge";
   } catch (const GameError& error) {
     EXPECT_NE(std::string(error.what()).find("did not converge in 50 Newton steps"), std::string::npos) << error.what();
@@ -246,6 +247,30 @@ class ExponentialCost final : public GradientsOnly {
  private:
   SparseRows pattern_{.start = {0, 2, 4}, .column = {0, 1, 0, 1}};
 };
+
+/// f_1' = x_1^3 - 2 x_1 + 2, at which Newton's method with whole steps goes from 0 to 1 and back for ever, f_2' = x_2.
+class CyclingCost final : public GradientsOnly {
+ public:
+  CyclingCost() : GradientsOnly(2) {}
+  [[nodiscard]] std::unique_ptr<Cost> clone() const override { return std::make_unique<CyclingCost>(*this); }
+  void own_gradients(const Real* points, int stride, Real* gradient) const override {
+    gradient[0] = points[0] * points[0] * points[0] - 2.0 * points[0] + 2.0;
+    gradient[1] = points[stride + 1];
+  }
+  [[nodiscard]] const SparseRows& hessian_pattern() const override { return pattern_; }
+  void hessian_rows(const Real* points, int /*stride*/, Real* values) const override {
+    values[0] = 3.0 * points[0] * points[0] - 2.0;
+    values[1] = 1.0;
+  }
+
+ private:
+  SparseRows pattern_{.start = {0, 1, 2}, .column = {0, 1}};
+};
+
+TEST(NashEquilibrium, IsFoundFromOtherStarts) {
+  const Shape shape{.players = 2, .dimension = 1, .neurons = 1, .order = {1, 1}};
+  EXPECT_NEAR(nash_equilibrium(CyclingCost(), shape)[0], -1.7692923542386314, 1e-14);
+}
 
 TEST(NashEquilibrium, OfOtherCostsTakesNewtonSteps) {
   const ExponentialCost cost;

@@ -127,7 +127,7 @@ TEST(GameDefinition, NumbersLandWhereTheCoreExpectsThem) {
   EXPECT_EQ(dynamics.coefficients[PolynomialDynamics::gain], (std::vector<Real>{1.0, 1.0, 1.0}));
   EXPECT_EQ(dynamics.jacobian_pattern().entries(), 4);  // linear and square terms of one entry are merged
   std::vector<Real> g(6);
-  dynamics.values(std::vector<Real>{1.0, 2.0, 3.0, 4.0, 5.0, 6.0}.data(), g.data());
+  dynamics.values(std::vector<Real>{1.0, 2.0, 3.0, 4.0, 5.0, 6.0}.data(), nullptr, g.data());
   EXPECT_EQ(g, (std::vector<Real>{0.0, 1.5 * 1.0 + 2.0 * 3.0, 0.0, 0.0, -0.25 * 16.0 + 2.0 * 6.0, 0.0}));
 }
 
@@ -135,7 +135,7 @@ TEST(GameDefinition, TermsOfBothKindsAreMerged) {
   const Game game = parse_game(edited("square = [[1, [0.0, -0.25]]]", "square = [[1, [3.0, 0.0]]]"));
   EXPECT_EQ(game.parameters.dynamics->jacobian_pattern().entries(), 3);
   std::vector<Real> g(6);
-  game.parameters.dynamics->values(std::vector<Real>{2.0, 0.0, 0.0, 1.0, 0.0, 0.0}.data(), g.data());
+  game.parameters.dynamics->values(std::vector<Real>{2.0, 0.0, 0.0, 1.0, 0.0, 0.0}.data(), nullptr, g.data());
   EXPECT_EQ(g, (std::vector<Real>{0.0, 1.5 * 2.0 + 3.0 * 4.0, 0.0, 0.0, 0.0, 0.0}));
 }
 
@@ -163,7 +163,7 @@ TEST(GameDefinition, OfTheFiveVehiclesIsThePapersExample) {
   EXPECT_EQ(p.cost->value(0, x.data()), 89.0 + 3.0 + 1.0 + (1.0 + 196.0));
   EXPECT_EQ(p.cost->value(3, x.data()), 4.0 * (64.0 - 8.0 + 1.0) + (16.0 + 4.0) + (1.0 + 324.0));
   std::vector<Real> g(10);
-  p.dynamics->values(x.data(), g.data());
+  p.dynamics->values(x.data(), nullptr, g.data());
   // g_1 = x_2; g_2 = (x_21^2 + x_31, x_22); g_3 = 3 x_3; g_4 = 4 x_4; g_5 = 5 x_5
   EXPECT_EQ(g, (std::vector<Real>{-4.0, 17.0, 3.0, 0.0, -5.0, -6.0, -6.0, 24.0, -32.0, 50.0}));
   std::vector<Real> d(10);

@@ -67,6 +67,10 @@ std::vector<MatrixEntry> matrix_of(const LoopJacobian& jacobian, bool coupled) {
     for (int k = dynamics_rows.start[at(p)]; k < dynamics_rows.start[at(p + 1)]; ++k) {
       add(layout.x() + dynamics_rows.column[at(k)], jacobian.dynamics[at(k)]);
     }
+    const SparseRows& by_velocity = parameters.dynamics->velocity_pattern();
+    for (int k = by_velocity.start[at(p)]; k < by_velocity.start[at(p + 1)]; ++k) {
+      add(layout.reference() + by_velocity.column[at(k)], jacobian.dynamics_by_velocity[at(k)]);
+    }
   };
 
   for (int p = 0; p < n; ++p) {

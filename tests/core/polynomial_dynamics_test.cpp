@@ -26,11 +26,11 @@ PolynomialDynamics dynamics() {
 TEST(PolynomialDynamics, ValuesAreTheFormula) {
   std::vector<Real> g(N * D, 99.0);
   PolynomialDynamics d = dynamics();
-  d.values(x.data(), g.data());
+  d.values(x.data(), nullptr, g.data());
   // g_11 = x_21^2 + 2 x_31 - 0.5 x_31^2, g_22 = -x_12 + 0.25 x_12^2, g_32 = 3 x_32
   EXPECT_EQ(g, (std::vector<Real>{9.0 - 2.0 - 0.5, 0.0, 0.0, 0.0, -2.0 + 1.0, 12.0}));
   d.coefficients[PolynomialDynamics::gain] = {2.0, -1.0, 0.5};
-  d.values(x.data(), g.data());
+  d.values(x.data(), nullptr, g.data());
   EXPECT_EQ(g, (std::vector<Real>{13.0, 0.0, 0.0, 0.0, 1.0, 6.0}));
 }
 
@@ -42,16 +42,16 @@ TEST(PolynomialDynamics, JacobianIsTheDerivativeOfTheValues) {
   EXPECT_EQ(pattern.start, (std::vector<int>{0, 2, 2, 2, 2, 3, 4}));
   EXPECT_EQ(pattern.column, (std::vector<int>{1, 2, 3, 5}));
   std::vector<Real> values(at(pattern.entries()));
-  d.jacobian(x.data(), values.data());
+  d.jacobian(x.data(), nullptr, values.data());
   std::vector<Real> above(N * D);
   std::vector<Real> below(N * D);
   for (int row = 0; row < N * D; ++row) {
     for (int k = pattern.start[at(row)]; k < pattern.start[at(row + 1)]; ++k) {
       std::vector<Real> moved = x;
       moved[at(pattern.column[at(k)])] += 0.5;
-      d.values(moved.data(), above.data());
+      d.values(moved.data(), nullptr, above.data());
       moved[at(pattern.column[at(k)])] -= 1.0;
-      d.values(moved.data(), below.data());
+      d.values(moved.data(), nullptr, below.data());
       EXPECT_DOUBLE_EQ(values[at(k)], above[at(row)] - below[at(row)]);  // exact for squares
     }
   }
@@ -63,14 +63,14 @@ TEST(PolynomialDynamics, ACloneKeepsGainsAndTerms) {
   const std::unique_ptr<UnknownDynamics> clone = d.clone();
   d.coefficients[PolynomialDynamics::gain][0] = 7.0;
   std::vector<Real> g(N * D);
-  clone->values(x.data(), g.data());
+  clone->values(x.data(), nullptr, g.data());
   EXPECT_EQ(g[0], 3.0 * 6.5);
 }
 
 TEST(PolynomialDynamics, WithoutTermsIsZero) {
   const PolynomialDynamics none(N, D);
   std::vector<Real> g(N * D, 99.0);
-  none.values(x.data(), g.data());
+  none.values(x.data(), nullptr, g.data());
   EXPECT_EQ(g, std::vector<Real>(N * D, 0.0));
   EXPECT_EQ(none.jacobian_pattern().entries(), 0);
   EXPECT_EQ(none.jacobian_pattern().rows(), N * D);
