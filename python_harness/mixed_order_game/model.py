@@ -16,6 +16,7 @@ import fmpy
 import numpy as np
 
 from .build import default_game, fmu_of
+from .definition import expressions_of, with_defaults
 from .errors import ModelError, VariableError, reason
 from .names import parse_name
 from .reading import expect_file, read_text, text_of, toml_of
@@ -77,7 +78,7 @@ class Model:
     tolerance: float  # relative, default experiment
     capabilities: Mapping[str, Mapping[str, bool | int]]  # by interface
     variables: Mapping[str, Variable]  # in the order of the file
-    game: Mapping[str, Any] = field(repr=False)  # resources/game.toml as tables
+    game: Mapping[str, Any] = field(repr=False)  # resources/game.toml as tables, its defaults applied
 
     @cached_property
     def order(self) -> tuple[int, ...]:
@@ -109,6 +110,11 @@ class Model:
     def player_names(self) -> tuple[str, ...]:
         """(N,)."""
         return tuple(str(player["name"]) for player in self.game["player"])
+
+    @cached_property
+    def expressions(self) -> Mapping[str, Sequence[int]]:
+        """1-based numbers of the players whose cost, dynamics or disturbance has an expression; by part."""
+        return expressions_of(self.game)
 
     @cached_property
     def _groups(self) -> dict[str, dict[tuple[int, ...], Variable]]:
@@ -265,7 +271,7 @@ def read_model(fmu: Path | str | None = None) -> Model:
     expect_file(path, "FMU", ModelError)
     try:
         with zipfile.ZipFile(path) as archive:
-            game = toml_of(text_of(archive.read("resources/game.toml")))
+            game = with_defaults(toml_of(text_of(archive.read("resources/game.toml"))))
         description = fmpy.read_model_description(str(path), validate=False)
     except KeyError as error:
         raise ModelError(f"{path} is not an FMU of this project: {error.args[0]}") from error

@@ -1,12 +1,13 @@
 """A game's parameters as arrays: from the FMU's variables and, for the unknown dynamics, its game file."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .definition import Expressions, initial_estimates, require_coefficients
 from .model import Model, Value
 
 FloatArray = NDArray[np.float64]
@@ -35,6 +36,8 @@ class GameParameters:
     dynamics_linear: FloatArray  # (N, N, D), G_ij,l times dynamics_gain[i]
     dynamics_square: FloatArray  # (N, N, D), H_ij,l times dynamics_gain[i]
     disturbance_bound: FloatArray  # (N, D), |bias| + |amplitude|, at least max_t |d_il(t)|
+    expressions: Expressions = field(default_factory=dict)  # besides these coefficients; x* and g are then the FMU's
+    x_star: FloatArray | None = None  # (N, D), of the FMU; needed where costs have expressions
 
     @property
     def players(self) -> int:
@@ -53,6 +56,7 @@ class GameParameters:
 
     def unknown_dynamics(self, x: FloatArray) -> FloatArray:
         """g_i(x)_l = sum_j (G_ij,l x_jl + H_ij,l x_jl^2) for x (N, D); returns (N, D)."""
+        require_coefficients(self.expressions, "the unknown term at a point", "dynamics")
         linear = np.einsum("ijl,jl->il", self.dynamics_linear, x)
         return np.asarray(linear + np.einsum("ijl,jl->il", self.dynamics_square, x * x))
 
@@ -90,6 +94,7 @@ def game_parameters(model: Model, changes: Mapping[str, Value] | None = None) ->
         dynamics_square=gain * _dynamics(players, "square", D),
         disturbance_bound=np.abs(array("disturbance_bias", N, D))
         + np.abs(array("disturbance_amplitude", N, D)),
+        expressions=model.expressions,
     )
 
 
@@ -103,10 +108,9 @@ def _dynamics(players: Sequence[Mapping[str, Any]], kind: str, dimension: int) -
 
 
 def _estimates(players: Sequence[Mapping[str, Any]], dimension: int) -> FloatArray:
-    """y0 (N, N, D) of the game file; one number stands for all of a player, 0 for none."""
+    """y0 (N, N, D) of the game file."""
     estimates = np.zeros((len(players), len(players), dimension))
-    for i, player in enumerate(players):
-        y0 = player.get("y0", 0.0)
-        for j in range(len(players)):
-            estimates[i, j] = y0[j] if isinstance(y0, list) else y0
+    for i in range(len(players)):
+        for j, estimate in enumerate(initial_estimates(players, i, dimension)):
+            estimates[i, j] = estimate
     return estimates

@@ -15,6 +15,7 @@ with n = 2 N + N^2, states of several coordinates are columns. Entry N + i is z_
 import numpy as np
 from numpy.typing import NDArray
 
+from .definition import has_expressions, require_coefficients
 from .errors import GameError
 from .parameters import GameParameters
 
@@ -30,7 +31,11 @@ SWEEPS, BALANCED = 100, 0.1
 
 
 def gradient_map(game: GameParameters) -> FloatArray:
-    """h (N, N) with grad_i f_i(x) = sum_j h_ij x_j + l_i."""
+    """h (N, N) with grad_i f_i(x) = sum_j h_ij x_j + l_i.
+
+    Raises GameError for a cost with an expression.
+    """
+    require_coefficients(game.expressions, "the linear map of the gradients", "cost")
     coupling = game.cost_coupling - np.diag(np.diag(game.cost_coupling))
     return np.asarray(2.0 * (np.diag(game.cost_quadratic + coupling.sum(axis=1)) - coupling))
 
@@ -45,8 +50,11 @@ def nash_equilibrium(game: GameParameters) -> FloatArray:
     """x* (N, D) with h x* + l = 0, where no player can lower its cost.
 
     Raises GameError, as the build of an FMU does, if h is singular whatever the units of its rows and
-    columns, or a player's cost is concave in its own action.
+    columns, or a player's cost is concave in its own action. Where a cost has an
+    expression, x* is that of the FMU, and GameError is raised if it was not taken from there.
     """
+    if has_expressions(game.expressions, "cost") and game.x_star is not None:
+        return game.x_star
     h = gradient_map(game)
     curvature = np.diag(h)
     concave = np.flatnonzero(curvature < -ROUNDING * np.abs(h).max(axis=1))

@@ -2,6 +2,7 @@
 
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import asdict
 from itertools import groupby
 from typing import Any
 
@@ -11,6 +12,7 @@ from rich.table import Table
 from rich.text import Text
 
 from .errors import ResultError
+from .definition import PARTS, NamedParameter, named_parameters
 from .model import Model, provenance
 from .printing import show, standard_output
 from .results import Result
@@ -30,10 +32,20 @@ def print_info(model: Model, *, variables: bool = False) -> None:
     edges = ", ".join(f"{i}-{j}" + (f" ({w:g})" if w != 1.0 else "") for i, j, w in model.edges)
     grid.add_row("graph", Text(edges))
     grid.add_row("gains", ", ".join(f"{name} = {value:g}" for name, value in model.gains.items()))
+    for part, numbers in model.expressions.items():
+        grid.add_row("expressions", f"{PARTS[part]} of {_counted(numbers, model.players)}")
     grid.add_row("experiment", f"{model.stop_time:g} s, step {model.step:g} s, tolerance {model.tolerance:g}")
     counts = ", ".join(f"{count} {kind}" for kind, count in data["variable_counts"].items())
     grid.add_row("variables", counts)
     show(grid, console)
+
+    parameters = named_parameters(model.game)
+    if parameters:
+        table = Table("parameter", "value", "range", "unit", "meaning", box=LINES)
+        for each in parameters:
+            cells = (each.name, _parameter_value(each), _range(each.min, each.max), each.unit, each.description)
+            table.add_row(*map(Text, cells))
+        show(table, console)
 
     sources = provenance(model)
     if sources:
@@ -52,10 +64,7 @@ def print_info(model: Model, *, variables: bool = False) -> None:
         table = Table("variable", "causality", "variability", "start", "range", "unit", "meaning", box=LINES)
         for entry in model.variables.values():
             start = "" if entry.start is None else _plain(entry.start)
-            bounds = (entry.minimum, entry.maximum)
-            limits = (
-                "" if bounds == (None, None) else " to ".join("" if b is None else f"{b:g}" for b in bounds)
-            )
+            limits = _range(entry.minimum, entry.maximum)
             cells = (entry.name, entry.causality, entry.variability, start, limits, entry.unit or "")
             table.add_row(*map(Text, cells), Text(entry.description))
         show(table, console)
@@ -76,6 +85,8 @@ def info_data(model: Model, *, variables: bool = False) -> dict[str, Any]:
         "player_names": list(model.player_names),
         "edges": [list(edge) for edge in model.edges],
         "gains": model.gains,
+        "named_parameters": [asdict(each) for each in named_parameters(model.game)],
+        "expressions": {part: list(numbers) for part, numbers in model.expressions.items()},
         "stop_time": model.stop_time,
         "step": model.step,
         "tolerance": model.tolerance,
@@ -140,6 +151,32 @@ def _orders(order: Sequence[int]) -> str:
     if len(order) <= LONGEST_LIST:
         return ",".join(map(str, order))
     return ", ".join(f"{len(list(run))} x {value}" for value, run in groupby(order))
+
+
+def _counted(numbers: Sequence[int], players: int) -> str:
+    """Players by their numbers: all players, player 2, players 1, 3."""
+    if len(numbers) == players:
+        return "all players"
+    told = ", ".join(map(str, numbers[:LONGEST_LIST])) + (", ..." if len(numbers) > LONGEST_LIST else "")
+    return f"player{'s' if len(numbers) > 1 else ''} {told}"
+
+
+def _parameter_value(parameter: NamedParameter) -> str:
+    value = parameter.value
+    if not isinstance(value, list):
+        text = f"{value:g}"
+    elif isinstance(value[0], list):
+        text = f"{len(value)} x {len(value[0])}"
+    elif len(value) <= LONGEST_LIST:
+        text = f"[{', '.join(f'{entry:g}' for entry in value)}]"
+    else:
+        text = f"a list of {len(value)}"
+    return f"{text}, fixed" if parameter.fixed else text
+
+
+def _range(low: float | None, high: float | None) -> str:
+    bounds = (low, high)
+    return "" if bounds == (None, None) else " to ".join("" if b is None else f"{b:g}" for b in bounds)
 
 
 def _numbers(values: Any) -> str:

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .arguments import number_argument
+from .definition import require_coefficients
 from .designs import Range
 from .errors import MixedOrderGameError, SimulationError
 from .graphs import CommunicationGraph, graph_of
@@ -295,6 +296,7 @@ class _Search:
                 raise TuneError(f"the range of {name} does not begin above 0")
             check_value(model.variable(name), each.low)
             check_value(model.variable(name), each.high)
+        require_coefficients(model.expressions, "tune", "cost")
         self.game = game_parameters(model, self.fixed)
         self.graphs = (graph_of(self.game.adjacency),) if graphs is None else tuple(graphs)
         if not self.graphs:

@@ -5,7 +5,7 @@ One rule for every game. The switches `robust` and `perturbed` are set for each 
 
 import math
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +18,7 @@ from .claims.perturbed_run import PerturbedRun
 from .claims.practical_convergence import Observed, nothing_to_observe, observe, practical_convergence
 from .claims.tolerances import TOLERANCE
 from .claims.unperturbed_loop import (
+    slowest_rate_seen,
     spectrum_of,
     unperturbed_actions_converge,
     unperturbed_loop_stable,
@@ -25,11 +26,13 @@ from .claims.unperturbed_loop import (
 )
 from .claims.verdict import Claim, Verdict
 from .claims.weights import weights_bounded
+from .definition import has_expressions
 from .errors import SimulationError
 from .model import Model
 from .parameters import GameParameters, game_parameters
 from .results import Result
 from .run import Progress, Simulator
+from .unknown_term import UNKNOWN, FloatArray, recorded_for_unknown_term
 
 __all__ = ["LIMIT", "Claim", "Validation", "Verdict", "validate"]
 
@@ -120,6 +123,8 @@ def validate(
     with Simulator(fmu) as simulator:
         model = simulator.model
         game = game_parameters(model)
+        if has_expressions(game.expressions, "cost"):
+            game = replace(game, x_star=_equilibrium_of(simulator))
         equilibrium = nash_equilibrium_exists(game)
         if equilibrium.verdict is Verdict.FAILS:
             claims = [
@@ -130,10 +135,13 @@ def validate(
             return Validation(model, tuple(claims), (), None, None)
         spectrum = spectrum_of(game)
         plain = unperturbed_run(simulator, game, spectrum, progress=progress)
+        if has_expressions(game.expressions, "cost"):
+            spectrum = replace(spectrum, slowest_rate=slowest_rate_seen(plain))
         stability = unperturbed_loop_stable(game, spectrum)
         convergence = unperturbed_actions_converge(game, spectrum, plain)
         robust = _default_experiment(simulator, game, progress)
-        observed, practical = None, _practical_despite(game, stability, convergence)
+        observed = None
+        practical = _practical_despite(game, stability, convergence) or _unmeasured(model, game)
         if not practical:
             observed = observe(
                 simulator, game, slowest_rate=spectrum.slowest_rate, limit=limit, progress=progress
@@ -147,7 +155,7 @@ def validate(
     return Validation(
         model=model,
         claims=tuple(claims),
-        notes=tuple(explain(run, game) for run in _runs(observed)[:1]),
+        notes=(*(explain(run, game) for run in _runs(observed)[:1]), *_notes(game)),
         robust=robust if isinstance(robust, Result) else None,
         plain=plain if isinstance(plain, Result) else None,
     )
@@ -190,6 +198,36 @@ def _practical_despite(game: GameParameters, stability: Claim, convergence: Clai
         "actions that are far enough from x*."
     )
     return nothing_to_observe(game, Verdict.FAILS, reason)
+
+
+def _unmeasured(model: Model, game: GameParameters) -> list[Claim]:
+    """Theorem 1's claims where the FMU does not show the unknown term; empty where it does."""
+    if recorded_for_unknown_term(model) is not None:
+        return []
+    reason = (
+        f"The residual g + d - W'S cannot be measured: {has_expressions(game.expressions, *UNKNOWN)}, and an FMU "
+        'with expose = "outputs" has no time derivatives.'
+    )
+    return nothing_to_observe(game, Verdict.NOT_COVERED, reason)
+
+
+def _notes(game: GameParameters) -> list[str]:
+    """What settling rests on where the game file does not tell it."""
+    notes = []
+    cost, disturbance = (has_expressions(game.expressions, part) for part in ("cost", "disturbance"))
+    if cost:
+        notes.append(f"The slowest rate is that of the unperturbed run: {cost}.")
+    if disturbance:
+        notes.append(
+            f"Whether the windows in which settling is judged span every period is not known: {disturbance}."
+        )
+    return notes
+
+
+def _equilibrium_of(simulator: Simulator) -> FloatArray:
+    """x* (N, D) of the FMU, from a run that hardly begins."""
+    moment = 1e-6 * simulator.model.stop_time
+    return simulator.run(stop_time=moment, step=moment, outputs=["x", "x_star"]).x_star
 
 
 def _runs(observed: Observed | None) -> list[PerturbedRun]:

@@ -11,6 +11,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from ..definition import require_coefficients
 from ..parameters import GameParameters
 from ..spectrum import gradient_map, monotonicity_constant, nash_equilibrium
 from .graph import consensus_eigenvalues, laplacian
@@ -196,6 +197,7 @@ def dynamics_constants(
     |dg_il/dx_jl| = |G + 2 H x_jl| <= |G + 2 H x*_jl| + 2 |H| r entrywise, the norm of the matrix of bounds
     is a bound of the norm. The paper takes sqrt(n) max eta_i and sqrt(N - n) max eta_i for the columns f.
     """
+    require_coefficients(parameters.expressions, "a Lipschitz constant of g", "dynamics")
     x_star = nash_equilibrium(parameters)
     first = parameters.first_order
 
@@ -230,6 +232,7 @@ def dynamics_bound(parameters: GameParameters, radius: float) -> FloatArray:
 
     Exact for linear g.
     """
+    require_coefficients(parameters.expressions, "a bound of g", "dynamics")
     x_star = nash_equilibrium(parameters)
     slope = parameters.dynamics_linear + 2.0 * parameters.dynamics_square * x_star[np.newaxis]
     curvature = np.abs(parameters.dynamics_square).max(axis=1)

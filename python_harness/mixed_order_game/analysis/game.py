@@ -10,6 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..build import source_of
+from ..definition import (
+    expressions_of,
+    initial_estimates,
+    initial_references,
+    require_coefficients,
+    with_defaults,
+)
 from ..errors import GameError
 from ..model import Value, read_model
 from ..parameters import GameParameters, game_parameters
@@ -17,6 +24,9 @@ from ..reading import ReadError, expect_file, read_text, suffix_of, toml_of
 
 FloatArray = NDArray[np.float64]
 Table = Mapping[str, Any]
+
+ANALYSIS = "the analysis"
+"""What refuses expressions, in sentences."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +52,7 @@ class AnalysedGame:
     beta: float  # adaptation gain, 1/s
     centers: FloatArray  # (q, N D), mu_m; entry j D + l meets y_ijl
     width: float  # rho
-    tables: Table  # the game file
+    tables: Table  # the game file, its defaults applied
     path: Path
 
     @property
@@ -63,12 +73,13 @@ def read_game(path: Path | str, changes: Mapping[str, Value] | None = None) -> A
 
     changes replace start values of an FMU.
 
-    Raises GameError for a file that is missing or breaks the definition of a game, ModelError for a broken
-    FMU, VariableError for a change that the FMU would not take.
+    Raises GameError for a file that is missing, breaks the definition of a game or has expressions, ModelError
+    for a broken FMU, VariableError for a change that the FMU would not take.
     """
     path = source_of(path)
     if suffix_of(path) == ".fmu":
         model = read_model(path)
+        require_coefficients(model.expressions, ANALYSIS)
         values = model.start_values(changes)
         parameters = game_parameters(model, changes)
         network = {**model.game["rbf"], "width": float(values["rho"])}
@@ -139,6 +150,8 @@ def _toml_value(value: object) -> str:
 
 
 def _game_from_tables(tables: Table, path: Path) -> AnalysedGame:
+    tables = with_defaults(tables)
+    require_coefficients(expressions_of(tables), ANALYSIS)
     players, gains = tables["player"], tables["gains"]
     N, D = len(players), int(tables["dimension"])
     order = np.array([int(player["order"]) for player in players])
@@ -158,10 +171,7 @@ def _game_from_tables(tables: Table, path: Path) -> AnalysedGame:
         for key, array in dynamics.items():
             for j, value in player.get("dynamics", {}).get(key, []):
                 array[i, _player(j, N)] = _coordinates(value, D)
-        rows_of_y0 = player.get("y0", 0.0)
-        if not isinstance(rows_of_y0, list):
-            rows_of_y0 = [rows_of_y0] * N
-        y0[i] = [_coordinates(row, D) for row in rows_of_y0]
+        y0[i] = [_coordinates(row, D) for row in initial_estimates(players, i, D)]
     adjacency = np.zeros((N, N))
     for i, j, *weight in tables["graph"]["edges"]:
         a, b = _player(i, N), _player(j, N)
@@ -176,7 +186,7 @@ def _game_from_tables(tables: Table, path: Path) -> AnalysedGame:
         cost_coupling=coupling,
         x0=rows("x0"),
         v0=rows("v0", 0.0),
-        z0=rows("z0", 0.0),
+        z0=np.array([_coordinates(initial_references(player), D) for player in players]),
         y0=y0,
         dynamics_linear=dynamics["linear"],
         dynamics_square=dynamics["square"],

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..analysis.exact_loop import LARGEST_LINEAR_LOOP
+from ..definition import require_coefficients
 from ..errors import GameError
 from ..parameters import GameParameters
 from ..spectrum import gradient_map, linear_loop, monotonicity_constant, nash_equilibrium, spectral_abscissa
@@ -39,8 +40,9 @@ class Choice:
 def choose_gains(game: GameParameters) -> Choice:
     """Gains for a game's costs, graph and perturbations; its own gains are not looked at.
 
-    Raises GameError if no factor gives a loop that decays well.
+    Raises GameError if no factor gives a loop that decays well, or for expressions.
     """
+    require_coefficients(game.expressions, "the choice of gains")
     k2 = 1.0
     steepest = float(np.linalg.norm(gradient_map(game), 2))  # Lipschitz constant of P
     slowest = _slowest_consensus(game.adjacency)

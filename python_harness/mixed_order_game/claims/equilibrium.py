@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from ..definition import has_expressions
 from ..errors import GameError
 from ..parameters import GameParameters
 from ..spectrum import monotonicity_constant, nash_equilibrium
@@ -12,7 +13,19 @@ FLAT = 1e-12
 
 
 def nash_equilibrium_exists(game: GameParameters) -> Claim:
-    """Gradients vanish at one point and no player's own cost is concave there."""
+    """Gradients vanish at one point and no player's own cost is concave there.
+
+    An FMU whose costs have expressions cannot be instantiated unless it found such a point.
+    """
+    expression = has_expressions(game.expressions, "cost")
+    if expression:
+        return Claim(
+            "nash_equilibrium",
+            "All gradients vanish at x*, and no cost is concave there in its player's own action",
+            Verdict.HOLDS,
+            f"The FMU's search found x*. As {expression}, it is not proved that x* is the only equilibrium, or "
+            "more than a local one.",
+        )
     verdict, reason = _judge(game)
     figures = {"m": monotonicity_constant(game)}
     return Claim("nash_equilibrium", "There is a unique Nash equilibrium x*", verdict, reason, figures)

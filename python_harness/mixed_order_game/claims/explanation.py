@@ -14,6 +14,7 @@ seen and cannot fail.
 import numpy as np
 from numpy.typing import NDArray
 
+from ..definition import has_expressions
 from ..parameters import GameParameters
 from ..spectrum import gradient_map, monotonicity_constant, nash_equilibrium
 from .perturbed_run import PerturbedRun
@@ -24,6 +25,9 @@ FloatArray = NDArray[np.float64]
 
 def explain(run: PerturbedRun, game: GameParameters) -> str:
     """One sentence with the bound and what it is made of."""
+    expression = has_expressions(game.expressions, "cost")
+    if expression:
+        return f"No bound explains the neighbourhood: {expression}, and the bound is for quadratic costs."
     m = monotonicity_constant(game)
     if m <= 0.0:
         return (

@@ -6,11 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..definition import has_expressions
 from ..parameters import GameParameters
 from ..results import Result
 from ..run import Progress, Simulator
 from ..spectrum import gradient_map
-from ..unknown_term import unknown_term
+from ..unknown_term import recorded_for_unknown_term, unknown_term
 from .early_end import Ended, run_or_end
 from .settling import WINDOWS, Maxima, window_maxima, window_of
 from .tolerances import TOLERANCE
@@ -89,6 +90,7 @@ def perturbed_run(
     """
     model = simulator.model
     recorded = [stem for stem in RECORDED if stem in model.variables or model.indexed(stem)]
+    recorded += recorded_for_unknown_term(model) or []
     count = len(model.select(recorded))
     step = max(step, stop_time * count / LARGEST_RECORD)
 
@@ -113,7 +115,9 @@ def _measured(result: Result, game: GameParameters, window: float) -> PerturbedR
     judged = result.window(result.time[-1] - WINDOWS * window, np.inf)
     largest = float(np.abs(result.x[judged]).max())
     floor = RESOLVED * TOLERANCE * (largest + 0.01)
-    steepest = game.k2 * float(np.abs(gradient_map(game)).sum(axis=1).max())
+    steepest = 1.0  # 1/s, where it is not known
+    if not has_expressions(game.expressions, "cost"):
+        steepest = game.k2 * float(np.abs(gradient_map(game)).sum(axis=1).max())
     pushed = max(float(np.abs(unknown[judged]).max()), float(np.abs(result.nn[judged]).max()))
 
     def maxima(values: FloatArray, resolved: float) -> Maxima:

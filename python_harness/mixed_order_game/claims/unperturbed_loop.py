@@ -11,13 +11,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..definition import has_expressions
 from ..model import Model
 from ..parameters import GameParameters
 from ..results import Result
 from ..run import Progress, Simulator
 from ..spectrum import consensus_rate, linear_loop, monotonicity_constant, predicted_deviation
 from .early_end import Ended, run_or_end
-from .settling import window_maxima, window_of
+from .settling import TIME_CONSTANTS, window_maxima, window_of
 from .tolerances import PLAIN_TOLERANCE
 from .verdict import Claim, Verdict
 
@@ -46,7 +47,7 @@ RESOLVED = 1000.0
 
 @dataclass(frozen=True)
 class Spectrum:
-    """Where the slowest mode lies; abscissa is None if the loop is too large for its eigenvalues."""
+    """Where the slowest mode lies; abscissa is None if the loop is too large for its eigenvalues, or not linear."""
 
     abscissa: float | None  # 1/s
     marginal: bool  # zero to rounding
@@ -59,7 +60,12 @@ class Spectrum:
 
 
 def spectrum_of(game: GameParameters) -> Spectrum:
-    """Eigenvalues of the linear loop; for large games rates of its parts in place of the slowest mode."""
+    """Eigenvalues of the linear loop; for large games rates of its parts in place of the slowest mode.
+
+    No rate is known beforehand where a cost has an expression: see slowest_rate_seen.
+    """
+    if has_expressions(game.expressions, "cost"):
+        return Spectrum(None, marginal=False, slowest_rate=0.0)
     if game.players > LARGEST_LINEAR_LOOP:
         gains = [game.k1] * bool(game.first_order.any()) + [game.k4] * bool((~game.first_order).any())
         pull = game.k2 * monotonicity_constant(game)
@@ -79,6 +85,9 @@ def unperturbed_loop_stable(game: GameParameters, spectrum: Spectrum) -> Claim:
         figures = {} if abscissa is None else {"abscissa": abscissa}
         return Claim("theorem_2_stability", statement, verdict, reason, figures)
 
+    expression = has_expressions(game.expressions, "cost")
+    if expression:
+        return claim(Verdict.NOT_COVERED, f"The loop is not linear, {expression}: it has no eigenvalues to judge.")
     if abscissa is None:
         states = 2 * game.players + game.players**2
         reason = f"The linear loop has {states:,} states a coordinate, too many for its eigenvalues."
@@ -134,7 +143,7 @@ def unperturbed_actions_converge(game: GameParameters, spectrum: Spectrum, run: 
     if isinstance(run, Ended):
         return claim(Verdict.FAILS if run.escaped else Verdict.NOT_SETTLED, str(run))
     if spectrum.abscissa is None:
-        return claim(*_seen(run))
+        return claim(*_seen(run, has_expressions(game.expressions, "cost") or "the loop is too large"))
     if spectrum.marginal:
         return claim(Verdict.NOT_SETTLED, "The exact solution neither decays nor grows, to rounding.")
     times, exact = predicted_deviation(game, float(run.time[-1]), len(run.time) - 1)
@@ -165,12 +174,35 @@ def largest_disagreement(
     return float(ratio[k]), float(times[k]), float(np.abs(seen[k]).max()), float(np.abs(exact[k]).max())
 
 
-def _seen(run: Result) -> tuple[Verdict, str]:
-    """Of a loop that is too large for its exact solution."""
+def slowest_rate_seen(run: Result | Ended) -> float:
+    """Rate in 1/s at which the largest |x - x*| fell in the last half of a run, until it was not resolved.
+
+    0 if the run ended early, or if the error did not fall by exp(TIME_CONSTANTS) in all.
+    """
+    if isinstance(run, Ended):
+        return 0.0
     error = np.abs(run.x - run.x_star).max(axis=(1, 2))
-    floor = RESOLVED * PLAIN_TOLERANCE * (float(np.abs(run.x).max()) + 0.01)
-    last = window_maxima(run.time, error, window_of(float(run.time[-1]), 0.0), floor)
+    still = np.maximum.accumulate(error[::-1])[::-1]
+    resolved = np.flatnonzero(still > _floor(run))
+    if resolved.size < 4:
+        return 0.0
+    end = int(resolved[-1])
+    begin = end // 2
+    if not still[end] < still[0] * np.exp(-TIME_CONSTANTS):
+        return 0.0
+    return max(0.0, float(np.log(still[begin] / still[end]) / (run.time[end] - run.time[begin])))
+
+
+def _floor(run: Result) -> float:
+    """Distance from x* that the integrator does not resolve."""
+    return RESOLVED * PLAIN_TOLERANCE * (float(np.abs(run.x).max()) + 0.01)
+
+
+def _seen(run: Result, why: str) -> tuple[Verdict, str]:
+    """Of a loop without an exact solution; why in half a sentence."""
+    error = np.abs(run.x - run.x_star).max(axis=(1, 2))
+    last = window_maxima(run.time, error, window_of(float(run.time[-1]), 0.0), _floor(run))
     if last.grow:
         return Verdict.FAILS, f"The largest |x - x*| grows from window to window: {last}."
     told = f"the run goes from {error[0]:.3g} to {error[-1]:.3g} from x* in {run.time[-1]:.4g} s"
-    return Verdict.NOT_COVERED, f"The loop is too large for its exact solution; {told}."
+    return Verdict.NOT_COVERED, f"There is no exact solution to compare with, as {why}; {told}."

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from ..claims.tolerances import PLAIN_TOLERANCE, TOLERANCE
 from ..claims.unperturbed_loop import LARGEST_LINEAR_LOOP
+from ..definition import has_expressions
 from ..errors import ResultError
 from ..model import Model, Value
 from ..names import parse_name
@@ -17,7 +18,7 @@ from ..results import Result
 from ..run import Simulator
 from ..spectrum import linear_loop, spectral_abscissa
 from ..times import in_seconds
-from ..unknown_term import unknown_term
+from ..unknown_term import UNKNOWN, recorded_for_unknown_term, unknown_term
 from ..validate import Validation, validate
 
 FloatArray = NDArray[np.float64]
@@ -85,16 +86,20 @@ def evidence_of_game(
                 stop_time=stop,
                 step=model.step,
                 tolerance=tolerance,
-                outputs=_signals(model) if estimates else None,
+                outputs=[*_signals(model, estimates=estimates), *(rates or [])] if estimates or rates else None,
                 progress=None if progress is None else lambda time: progress(name, time / stop),
             )
 
+        rates = recorded_for_unknown_term(model)
         estimates = bool(model.indexed("y")) and model.players <= MOST_ESTIMATING
         result = simulate("run", changes or {}, TOLERANCE, estimates=estimates)
         off = {**(changes or {}), "robust": False, "perturbed": False}
         plain = simulate("unperturbed run", off, PLAIN_TOLERANCE, estimates=False)
     abscissa = None
-    if game.players <= LARGEST_LINEAR_LOOP:
+    cost = has_expressions(game.expressions, "cost")
+    if cost:
+        notes.append(f"No rate is predicted: {cost}, and the unperturbed loop is not linear.")
+    elif game.players <= LARGEST_LINEAR_LOOP:
         abscissa = spectral_abscissa(linear_loop(game))
     else:
         notes.append(f"No rate is predicted: the linear loop of {game.players} players is too large.")
@@ -102,6 +107,9 @@ def evidence_of_game(
         many = f"there are N^2 D of them, and N = {model.players} exceeds {MOST_ESTIMATING}"
         why = many if model.players > MOST_ESTIMATING else "the FMU does not expose them"
         notes.append(f"Estimates are not drawn one by one: {why}.")
+    if rates is None:
+        unknown = has_expressions(game.expressions, *UNKNOWN)
+        notes.append(f"The unknown term is not drawn: {unknown}, and the FMU exposes no time derivatives.")
     validation = None
     if changes:
         notes.append("The claims are about the game as it stands; this run has changed parameters.")
@@ -113,7 +121,7 @@ def evidence_of_game(
         changes=changes,
         plain=plain,
         abscissa=abscissa,
-        unknown=unknown_term(game, result),
+        unknown=None if rates is None else unknown_term(game, result),
         validation=validation,
         notes=tuple(notes),
     )
@@ -165,13 +173,13 @@ def energy_so_far(result: Result) -> FloatArray:
     return np.vstack([np.zeros(power.shape[1]), np.cumsum(steps, axis=0)])
 
 
-def _signals(model: Model) -> list[str]:
-    """Every output and local, estimates included, weights and derivatives not."""
+def _signals(model: Model, *, estimates: bool) -> list[str]:
+    """Every output and local but weights and derivatives, and the estimates unless wanted."""
     return [
         variable.name
         for variable in model.variables.values()
         if variable.causality in ("output", "local")
         and variable.variability != "constant"
-        and parse_name(variable.name)[0] != "W"
+        and parse_name(variable.name)[0] not in (("W",) if estimates else ("W", "y"))
         and not variable.name.startswith("der(")
     ]
