@@ -9,7 +9,7 @@ import difflib
 import math
 import re
 import subprocess
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -24,6 +24,7 @@ from .schema import game_schema
 NOT_TOML = re.compile(r"line (\d+)(?:, column \d+)? of the game definition (.*)")
 UNKNOWN_KEY = re.compile(r'"(.*)" is an unknown key of (\S+|the game definition), ')
 ENTRY = re.compile(r"((?:[A-Za-z_]\w*)(?:\.\w+|\[\d+\])*) (?:is|leaves) ")
+EXPRESSION = re.compile(r"([A-Za-z_]\w*(?:\.\w+|\[\d+\])*), line (\d+), column \d+: .*")
 STEP = re.compile(r"(\w+)|\[(\d+)\]")
 
 LONGEST_TEXT = 40
@@ -64,8 +65,14 @@ def check_game(game: Path | str) -> tuple[Problem, ...]:
         return (Problem(1, sentence),)
     positions = Positions(text)
     first = _Found(_entry_of(sentence, document), sentence)
+    expression = EXPRESSION.fullmatch(sentence)
+    if expression is not None:  # which knows its line, the text's own may be an earlier one
+        first = _Found(_parsed(expression[1]), sentence)
     found = [first, *(each for each in _violations(document) if each.entry != first.entry)]
     problems = {Problem(positions.line(each.entry), each.sentence): None for each in found}
+    if expression is not None:
+        del problems[Problem(positions.line(first.entry), sentence)]
+        problems[Problem(int(expression[2]), sentence)] = None
     return tuple(sorted(problems, key=lambda problem: problem.line))
 
 
@@ -101,8 +108,16 @@ def _entry_of(sentence: str, document: Mapping[str, Any]) -> Entry:
         near = (key for key in keys if cut != unknown[1] and _readable(key).startswith(cut))
         key = unknown[1] if unknown[1] in keys else next(near, unknown[1])
         return (*table, key)
+    for name in _names_of_parameters(document):  # that need not be words
+        if sentence.startswith(f"parameters.{name} is "):
+            return "parameters", name
     entry = ENTRY.match(sentence)
     return () if entry is None else _parsed(entry[1])
+
+
+def _names_of_parameters(document: Mapping[str, Any]) -> Iterable[str]:
+    parameters = document.get("parameters")
+    return parameters if isinstance(parameters, Mapping) else ()
 
 
 def _parsed(path: str) -> Entry:
@@ -140,7 +155,11 @@ def _violations(document: Mapping[str, Any]) -> Iterator[_Found]:
 
 def _told(entry: Entry, error: Any, schema: Mapping[str, Any]) -> Iterator[_Found]:
     """One violation as one sentence for each entry that it is about."""
-    if error.validator == "additionalProperties":
+    if "propertyNames" in error.absolute_schema_path:
+        named = (*entry, error.instance)
+        expected = schema["properties"]["parameters"]["propertyNames"]["x-expected"]
+        yield _Found(named, f"{_shown(named)} stands there, expected {expected}")
+    elif error.validator == "additionalProperties":
         known = list(error.schema["properties"])
         for key in error.instance:
             if key not in known:

@@ -36,17 +36,29 @@ def game_schema(*, players: int | None = None, dimension: int | None = None) -> 
         each = definitions["perCoordinate"]
         each["then"] |= {"minItems": dimension, "maxItems": dimension, "x-expected": expected}
         each["else"]["x-expected"] = expected
+        texts = definitions["expressions"]
+        expected = f"a text, or a list of {dimension} texts"
+        texts["then"] |= {"minItems": dimension, "maxItems": dimension, "x-expected": expected}
+        texts["else"]["x-expected"] = expected
     if players is not None:
         definitions["playerIndex"] |= {
             "maximum": players,
             "x-expected": f"an integer from 1 to {players}",
         }
-        definitions["estimates"]["then"] |= {
+        guess = schema["properties"]["equilibrium"]["properties"]["guess"]
+        guess |= {
             "minItems": players,
             "maxItems": players,
-            "x-expected": f"a list of {players} estimates, one for each player, or one number",
+            "x-expected": f"a list of {players} actions, one for each player",
         }
     if players is not None and dimension is not None:
+        of_players = {"minItems": players, "maxItems": players}
+        of_coordinates = {"minItems": dimension, "maxItems": dimension, "items": {"$ref": "#/$defs/finite"}}
+        estimates = definitions["estimates"]["then"]
+        estimates["anyOf"] = [of_players] if dimension == 1 else [of_players, of_coordinates]
+        estimates["x-expected"] = (
+            f'"x0", a list of {players} estimates, one for each player, a list of {dimension} numbers, or one number'
+        )
         length = players * dimension
         definitions["vectorCenter"] |= {
             "minItems": length,
