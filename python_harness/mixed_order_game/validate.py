@@ -18,7 +18,7 @@ from .claims.perturbed_run import PerturbedRun
 from .claims.practical_convergence import Observed, nothing_to_observe, observe, practical_convergence
 from .claims.tolerances import TOLERANCE
 from .claims.unperturbed_loop import (
-    slowest_rate_seen,
+    run_until_decay_is_seen,
     spectrum_of,
     unperturbed_actions_converge,
     unperturbed_loop_stable,
@@ -134,9 +134,11 @@ def validate(
             ]
             return Validation(model, tuple(claims), (), None, None)
         spectrum = spectrum_of(game)
-        plain = unperturbed_run(simulator, game, spectrum, progress=progress)
+        plain: Result | Ended
         if has_expressions(game.expressions, "cost"):
-            spectrum = replace(spectrum, slowest_rate=slowest_rate_seen(plain))
+            plain, spectrum = run_until_decay_is_seen(simulator, game, spectrum, limit, progress)
+        else:
+            plain = unperturbed_run(simulator, game, spectrum, progress=progress)
         stability = unperturbed_loop_stable(game, spectrum)
         convergence = unperturbed_actions_converge(game, spectrum, plain)
         robust = _default_experiment(simulator, game, progress)

@@ -109,6 +109,7 @@ def edited(old: str, new: str) -> str:
         ("coupling = [[2, 1.0]]", "coupling = [[2, 1.0], [2, 1.0]]", "player 2 comes twice"),
         ("order = 1", "order = 1\n\n\norde = 2", '"orde" is an unknown key of player[1]'),
         ("W_max = 500.0", "W_max = -500.0  # bound", "rbf.W_max is -500"),
+        ("dimension = 2", "dimension = 2\nparameters.rho = 1.0", "parameters.rho has the name of a variable"),
     ],
 )
 def test_the_line_is_that_of_the_edit(old: str, new: str, told: str, tmp_path: Path) -> None:
@@ -118,6 +119,30 @@ def test_the_line_is_that_of_the_edit(old: str, new: str, told: str, tmp_path: P
     assert told in problems[0].sentence
     marker = new.rsplit("\n", 1)[-1]
     assert marker in text.splitlines()[problems[0].line - 1]
+
+
+OF_EXPRESSIONS = """
+[parameters]
+slope = 0.1
+# the next is no word
+"two words" = 1.0
+[defaults]
+cost = { expression = '''
+  (x[i,1] - 1)^2
+    + foo''' }
+"""
+
+
+def test_expressions_are_told_by_their_own_lines(tmp_path: Path) -> None:
+    text = default_game().read_text(encoding="utf-8") + OF_EXPRESSIONS
+    (named,) = check_game(written(tmp_path, text))
+    assert named.sentence.startswith("parameters.two words is 1, expected a name of letters, digits and _")
+    assert text.splitlines()[named.line - 1] == '"two words" = 1.0'
+    text = re.sub(r"^cost = \{ q.*$\n", "", text, flags=re.MULTILINE).replace('"two words"', "words")
+    (unknown,) = check_game(written(tmp_path, text))
+    assert f"defaults.cost.expression, line {unknown.line}, column 7: " in unknown.sentence
+    assert '"foo" is no name here' in unknown.sentence
+    assert text.splitlines()[unknown.line - 1].strip().startswith("+ foo")
 
 
 def test_says_what_building_says(tmp_path: Path) -> None:

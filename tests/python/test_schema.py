@@ -119,6 +119,30 @@ MALFORMED: dict[str, Edit] = {
     "disturbance is text": put("loud", "player", 0, "disturbance"),
     "unknown disturbance": put(1.0, "player", 0, "disturbance", "colour"),
     "amplitude is text": put("a", "player", 0, "disturbance", "amplitude"),
+    "z0 is x1": put("x1", "player", 0, "z0"),
+    "cost expression is a number": put(1.0, "player", 0, "cost", "expression"),
+    "cost expression is a list": put(["x[1,1]"], "player", 0, "cost", "expression"),
+    "dynamics expression is a number": put(1.0, "player", 0, "dynamics", "expression"),
+    "dynamics expression of numbers": put([1.0, 2.0], "player", 0, "dynamics", "expression"),
+    "disturbance expression is true": put(True, "player", 0, "disturbance", "expression"),
+    "defaults is a list": put([], "defaults"),
+    "default of a name": put({"name": "a"}, "defaults"),
+    "unknown default": put({"colour": 1}, "defaults"),
+    "parameters is a list": put([], "parameters"),
+    "parameter is text": put({"a": "1"}, "parameters"),
+    "parameter is an empty list": put({"a": []}, "parameters"),
+    "parameter of rows and numbers": put({"a": [[1.0], 2.0]}, "parameters"),
+    "parameter without a value": put({"a": {"min": 0.0}}, "parameters"),
+    "unknown key of a parameter": put({"a": {"value": 1.0, "least": 0.0}}, "parameters"),
+    "min is text": put({"a": {"value": 1.0, "min": "0"}}, "parameters"),
+    "fixed is a number": put({"a": {"value": 1.0, "fixed": 1}}, "parameters"),
+    "unit is a number": put({"a": {"value": 1.0, "unit": 1}}, "parameters"),
+    "parameter of a variable's name": put({"x": 1.0}, "parameters"),
+    "parameter of a function's name": put({"hypot": 1.0}, "parameters"),
+    "parameter of two words": put({"two words": 1.0}, "parameters"),
+    "equilibrium is a number": put(1.0, "equilibrium"),
+    "unknown equilibrium": put({"start": [1.0]}, "equilibrium"),
+    "guess is a number": put({"guess": 1.0}, "equilibrium"),
     "unknown key": put(1, "colour"),
     "unknown key of a player": put(1, "player", 0, "colour"),
 }
@@ -129,6 +153,9 @@ OF_KNOWN_SIZE: dict[str, Edit] = {
     "edge to player 6": put([1, 6], "graph", "edges", 0),
     "coupling to player 6": put([[6, 1.0]], "player", 0, "cost", "coupling"),
     "amplitude of one": put([1.0], "player", 0, "disturbance", "amplitude"),
+    "y0 of three numbers": put([0.0] * 3, "player", 0, "y0"),
+    "dynamics expression of three": put(["0"] * 3, "player", 0, "dynamics", "expression"),
+    "guess of four": put({"guess": [0.0] * 4}, "equilibrium"),
     "vector centers of nine": put([[0.0] * 9] * 11, "rbf", "centers"),
 }
 
@@ -163,6 +190,40 @@ def test_every_game_passes(path: Path) -> None:
     game = tomllib.loads(path.read_text(encoding="utf-8"))
     jsonschema.validate(game, game_schema())
     jsonschema.validate(game, game_schema(players=len(game["player"]), dimension=game["dimension"]))
+
+
+ACCEPTED: dict[str, Edit] = {
+    "y0 of coordinates": put([1.0, 2.0], "player", 0, "y0"),
+    "y0 = x0": put("x0", "player", 0, "y0"),
+    "z0 = x0": put("x0", "player", 0, "z0"),
+    "expressions": put({"linear": 1.0, "quadratic": 1.0, "expression": "x[i,1]^4"}, "player", 0, "cost"),
+    "expressions by coordinate": put({"expression": ["x[1,1]", "x[1,2]"]}, "player", 0, "dynamics"),
+    "expression with l": put({"expression": "sin(l * t)"}, "player", 0, "disturbance"),
+    "parameters": put(
+        {"A": 1, "b": [1.0, 2], "C": [[1.0], [2.0]], "d_2": {"value": 1.0, "max": 2, "unit": "m", "fixed": True}},
+        "parameters",
+    ),
+    "guess": put({"guess": [1.0, [2.0, 3.0], 4.0, 5.0, 6.0]}, "equilibrium"),
+    "defaults": put({"order": 2, "v0": 1.0, "z0": 1.0, "y0": "x0"}, "defaults"),
+}
+
+
+@pytest.mark.parametrize("name", ACCEPTED)
+def test_what_the_judge_accepts_passes(name: str, tmp_path: Path) -> None:
+    game = copy.deepcopy(example())
+    ACCEPTED[name](game)
+    path = tmp_path / "game.toml"
+    path.write_text(toml(game), encoding="utf-8")
+    assert check_game(path) == ()
+    jsonschema.validate(game, game_schema())
+    jsonschema.validate(game, game_schema(players=5, dimension=2))
+
+
+@pytest.mark.parametrize("key", ["order", "x0"])
+def test_a_player_needs_no_key_that_the_defaults_have(key: str) -> None:
+    game = copy.deepcopy(example())
+    game["defaults"] = {key: game["player"][1].pop(key)}
+    jsonschema.validate(game, game_schema())
 
 
 @pytest.mark.parametrize("graph", ["ring", "star"])

@@ -23,7 +23,7 @@ from .schema import game_schema
 
 NOT_TOML = re.compile(r"line (\d+)(?:, column \d+)? of the game definition (.*)")
 UNKNOWN_KEY = re.compile(r'"(.*)" is an unknown key of (\S+|the game definition), ')
-ENTRY = re.compile(r"((?:[A-Za-z_]\w*)(?:\.\w+|\[\d+\])*) (?:is|leaves) ")
+ENTRY = re.compile(r"((?:[A-Za-z_]\w*)(?:\.\w+|\[\d+\])*) (?:is|leaves|has) ")
 EXPRESSION = re.compile(r"([A-Za-z_]\w*(?:\.\w+|\[\d+\])*), line (\d+), column \d+: .*")
 STEP = re.compile(r"(\w+)|\[(\d+)\]")
 

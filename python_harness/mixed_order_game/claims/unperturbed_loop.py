@@ -6,7 +6,7 @@ that decay that is too slow shows and decay that is too fast as well.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,7 @@ from ..results import Result
 from ..run import Progress, Simulator
 from ..spectrum import consensus_rate, linear_loop, monotonicity_constant, predicted_deviation
 from .early_end import Ended, run_or_end
-from .settling import TIME_CONSTANTS, window_maxima, window_of
+from .settling import EXTENSION, TIME_CONSTANTS, window_maxima, window_of
 from .tolerances import PLAIN_TOLERANCE
 from .verdict import Claim, Verdict
 
@@ -104,10 +104,15 @@ def unperturbed_run(
     game: GameParameters,
     spectrum: Spectrum,
     *,
+    stop_time: float | None = None,
     progress: Callable[[str, float], None] | None = None,
 ) -> Result | Ended:
-    """Run long enough to see everything decay, or grow; every sample of predicted_deviation's."""
-    stop_time = _stop_time(simulator.model, spectrum)
+    """Run long enough to see everything decay, or grow; every sample of predicted_deviation's.
+
+    stop_time in s, in place of one that follows from the spectrum.
+    """
+    if stop_time is None:
+        stop_time = _stop_time(simulator.model, spectrum)
 
     def run(stop: float, follow: Progress) -> Result:
         return simulator.run(
@@ -174,8 +179,28 @@ def largest_disagreement(
     return float(ratio[k]), float(times[k]), float(np.abs(seen[k]).max()), float(np.abs(exact[k]).max())
 
 
+def run_until_decay_is_seen(
+    simulator: Simulator,
+    game: GameParameters,
+    spectrum: Spectrum,
+    limit: float,
+    progress: Callable[[str, float], None] | None,
+) -> tuple[Result | Ended, Spectrum]:
+    """For a loop without a known spectrum: the run, and the spectrum with the slowest rate that it shows.
+
+    The run lasts the FMU's default experiment, or longer up to the limit in s until a rate is seen.
+    """
+    stop = simulator.model.stop_time
+    while True:
+        run = unperturbed_run(simulator, game, spectrum, stop_time=stop, progress=progress)
+        rate = slowest_rate_seen(run)
+        if rate > 0.0 or isinstance(run, Ended) or stop >= limit:
+            return run, replace(spectrum, slowest_rate=rate)
+        stop = min(EXTENSION * stop, limit)
+
+
 def slowest_rate_seen(run: Result | Ended) -> float:
-    """Rate in 1/s at which the largest |x - x*| fell in the last half of a run, until it was not resolved.
+    """Rate in 1/s at which the largest |x - x*| of a run fell, while it was resolved: the slower of its last quarters.
 
     0 if the run ended early, or if the error did not fall by exp(TIME_CONSTANTS) in all.
     """
@@ -187,10 +212,11 @@ def slowest_rate_seen(run: Result | Ended) -> float:
     if resolved.size < 4:
         return 0.0
     end = int(resolved[-1])
-    begin = end // 2
     if not still[end] < still[0] * np.exp(-TIME_CONSTANTS):
         return 0.0
-    return max(0.0, float(np.log(still[begin] / still[end]) / (run.time[end] - run.time[begin])))
+    quarters = [end // 2, 3 * end // 4, end]
+    rates = -np.diff(np.log(still[quarters])) / np.diff(run.time[quarters])
+    return max(0.0, float(rates.min()))
 
 
 def _floor(run: Result) -> float:

@@ -1,0 +1,254 @@
+"""What commands and functions say of games with expressions: refused, judged or shown, never taken for zero."""
+
+import json
+from dataclasses import fields, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner, Result
+
+import mixed_order_game as mog
+from mixed_order_game.analysis import analyse, dynamics_constants, loop_constants, read_game
+from mixed_order_game.authoring.gains import choose_gains
+from mixed_order_game.build import build_fmu
+from mixed_order_game.claims.unperturbed_loop import slowest_rate_seen
+from mixed_order_game.claims.verdict import Verdict
+from mixed_order_game.cli import app
+from mixed_order_game.parameters import GameParameters, game_parameters
+from mixed_order_game.spectrum import linear_loop, monotonicity_constant, nash_equilibrium
+from mixed_order_game.tune import tune
+from mixed_order_game.unknown_term import recorded_for_unknown_term, unknown_term
+from mixed_order_game.validate import validate
+
+HEAD = """
+title = "Three sellers with exponential demand"
+dimension = 1
+[gains]
+k1 = 10.0
+k2 = 1.0
+k3 = 50.0
+k4 = 20.0
+beta = 5.0
+delta = 12.0
+epsilon = 0.1
+[rbf]
+centers = [-1.0, 0.0, 1.0, 2.0]
+width = 5.0
+W_max = 1000.0
+[graph]
+edges = [[1, 2], [2, 3], [3, 1]]
+"""
+GAME = (
+    HEAD
+    + """
+[parameters]
+price = { value = 12.0, min = 0.0, max = 100.0, description = "price at no demand" }
+h = [5.0, 7.0, 6.0]
+R = { value = [[0.0, 1.0, 0.0], [1.0, 0.0, 1.0], [0.0, 1.0, 0.0]], fixed = true }
+[defaults]
+cost = { expression = "(x[i] - h[i])^2 - price * x[i] * exp(-0.1 * sum(x[j] for j in 1..N))" }
+y0 = "x0"
+[[player]]
+name = "a"
+order = 1
+x0 = 1.0
+z0 = "x0"
+[[player]]
+name = "b"
+order = 2
+x0 = 1.5
+dynamics = { linear = [[1, 0.3]], expression = "sin(x[i]) * x[3] - 0.5 * v[i] * tanh(v[i] / 0.1)" }
+disturbance = { amplitude = 0.2, frequency = 3.0, expression = "0.3 * cos(2 * t) + exp(-t)" }
+[[player]]
+name = "c"
+order = 2
+x0 = 0.5
+dynamics = { expression = "sum(R[i,j] * x[j] for j in 1..N) / (1 + x[i]^2) - v[2] * log(2 + v[i]^2)" }
+"""
+)
+
+
+def command(*arguments: object) -> Result:
+    environment = {"COLUMNS": "200", "NO_COLOR": "1"}
+    return CliRunner(env=environment).invoke(app, [str(each) for each in arguments])
+
+
+@pytest.fixture(scope="module")
+def game(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("expressions") / "sellers.toml"
+    path.write_text(GAME, encoding="utf-8")
+    return path
+
+
+@pytest.fixture(scope="module")
+def fmu(game: Path) -> Path:
+    return build_fmu(game, game.with_suffix(".fmu"))
+
+
+def test_the_analysis_refuses(game: Path, fmu: Path) -> None:
+    told = "the analysis reads costs, dynamics and disturbances as coefficients; player 1's cost has an expression"
+    for call in (
+        lambda: analyse(game, simulation=False),
+        lambda: analyse(game, simulation=False, square=False),
+        lambda: analyse(fmu),
+        lambda: read_game(fmu),
+    ):
+        with pytest.raises(mog.GameError, match=told):
+            call()
+    refused = command("analyse", game, "--no-simulation")
+    assert (refused.exit_code, refused.stderr) == (1, f"mog: {told}\n")
+
+
+@pytest.mark.parametrize(
+    "function",
+    [linear_loop, monotonicity_constant, nash_equilibrium, loop_constants, dynamics_constants, choose_gains],
+)
+def test_what_reads_coefficients_refuses(function: object, fmu: Path) -> None:
+    parameters = game_parameters(mog.read_model(fmu))
+    assert callable(function)
+    with pytest.raises(mog.GameError, match="as coefficients; player 1's cost has an expression|player 2's dyn"):
+        function(parameters)
+    of_dynamics = replace(parameters, expressions={"dynamics": (2, 3)})
+    with pytest.raises(mog.GameError, match="as coefficients; player 2's dynamics have an expression"):
+        of_dynamics.unknown_dynamics(of_dynamics.x0)
+
+
+def test_tune_refuses(fmu: Path) -> None:
+    with pytest.raises(mog.GameError, match="tune reads costs as coefficients; player 1's cost has an expression"):
+        tune(fmu, 2.0)
+
+
+def test_the_unknown_term_is_that_of_the_formulas_by_hand(fmu: Path) -> None:
+    model = mog.read_model(fmu)
+    rates = recorded_for_unknown_term(model)
+    assert rates == ["der(x[1,1])", "der(v[2,1])", "der(v[3,1])"]
+    result = mog.run(fmu, stop_time=2.0, step=0.1, outputs=["x", "v", "z", "u", "y", "W", *rates])
+    found = unknown_term(game_parameters(model), result)[:, :, 0]
+    x, v = result.x[:, :, 0], result.v[:, :, 0]
+    t = result.time
+    by_hand = np.zeros_like(x)
+    by_hand[:, 1] = (
+        0.3 * x[:, 0] + np.sin(x[:, 1]) * x[:, 2] - 0.5 * v[:, 1] * np.tanh(v[:, 1] / 0.1)
+        + 0.2 * np.sin(3.0 * t) + 0.3 * np.cos(2.0 * t) + np.exp(-t)
+    )  # fmt: skip
+    by_hand[:, 2] = x[:, 1] / (1.0 + x[:, 2] ** 2) - v[:, 1] * np.log(2.0 + v[:, 2] ** 2)
+    assert np.abs(found - by_hand).max() < 1e-9 * np.abs(by_hand).max()
+
+
+def test_validate_judges_what_it_can(fmu: Path) -> None:
+    found = validate(fmu, limit=100.0)
+    verdicts = {claim.name: claim for claim in found.claims}
+    assert verdicts["nash_equilibrium"].verdict is Verdict.HOLDS
+    assert verdicts["nash_equilibrium"].statement.startswith("All gradients vanish at x*")
+    for name in ("theorem_2_stability", "theorem_2_convergence"):
+        assert verdicts[name].verdict is Verdict.NOT_COVERED
+        assert "player 1's cost has an expression" in verdicts[name].reason
+    assert verdicts["lemma_3_weights"].verdict is Verdict.HOLDS
+    assert "No bound explains the neighbourhood: player 1's cost has an expression" in found.notes[0]
+    for name in ("actions", "velocities", "estimates"):
+        assert verdicts[f"practical_convergence_{name}"].verdict is Verdict.HOLDS
+    assert any("player 2's disturbance has an expression" in note for note in found.notes)
+
+
+QUADRATIC = """
+[defaults]
+order = 2
+x0 = 4.0
+cost = { linear = -1.0, %s }
+[[player]]
+name = "a"
+order = 1
+[[player]]
+name = "b"
+x0 = -1.0
+[[player]]
+name = "c"
+"""
+
+
+def test_the_rate_seen_is_near_the_spectrum_of_the_same_game_in_coefficients(tmp_path: Path) -> None:
+    parameters: list[GameParameters] = []
+    files = []
+    for name, cost in (("coefficients", "quadratic = 0.7"), ("expression", 'expression = "0.7 * x[i]^2"')):
+        path = tmp_path / f"{name}.toml"
+        path.write_text(HEAD + QUADRATIC % cost, encoding="utf-8")
+        files.append(build_fmu(path, path.with_suffix(".fmu")))
+        parameters.append(game_parameters(mog.read_model(files[-1])))
+    eigenvalues = np.linalg.eigvals(linear_loop(parameters[0]))
+    off = {"robust": False, "perturbed": False}
+    seen = slowest_rate_seen(mog.run(files[1], start_values=off, stop_time=20.0, tolerance=1e-9))
+    assert seen == pytest.approx(-eigenvalues.real.max(), rel=0.1)
+
+
+STARTS = """
+[defaults]
+order = 2
+x0 = [1.0, -2.0]
+v0 = [0.5, 0.25]
+z0 = 3.0
+y0 = %s
+cost = { quadratic = 2.0, linear = [1.0, 2.0] }
+dynamics = { linear = [[1, 0.5]], square = [[2, [0.1, 0.2]]] }
+disturbance = { amplitude = 1.5, bias = [0.0, -1.0] }
+[[player]]
+name = "a"
+order = 1
+cost = { quadratic = 1.0 }
+[[player]]
+name = "b"
+x0 = 7.0
+dynamics = {}
+[[player]]
+name = "c"
+y0 = [[1.0, 2.0], 3.0, 4.0, 5.0]
+disturbance = { amplitude = 0.5 }
+[[player]]
+name = "d"
+order = 1
+z0 = "x0"
+"""
+
+
+@pytest.mark.parametrize("y0", ['"x0"', "[5.0, 6.0]", "2.5", "[1.0, 2.0, 3.0, [4.0, 5.0]]"])
+@pytest.mark.parametrize("expose", ["all", "outputs"])
+def test_defaults_are_read_as_the_fmu_reads_them(y0: str, expose: str, tmp_path: Path) -> None:
+    head = HEAD.replace("dimension = 1", f'dimension = 2\nexpose = "{expose}"').replace("[3, 1]", "[3, 4]")
+    path = tmp_path / "starts.toml"
+    path.write_text(head + STARTS % y0, encoding="utf-8")
+    model = mog.read_model(build_fmu(path, path.with_suffix(".fmu")))
+    of_fmu, of_file = game_parameters(model), read_game(path).parameters
+    for each in fields(GameParameters):
+        if each.name not in ("expressions", "x_star"):
+            assert np.array_equal(getattr(of_fmu, each.name), getattr(of_file, each.name)), each.name
+    assert np.array_equal(of_file.cost_quadratic, [1.0, 2.0, 2.0, 2.0])
+    assert np.array_equal(of_file.cost_linear[0], [0.0, 0.0])  # the whole key is replaced
+
+
+def test_defaults_of_coefficients_are_analysed(tmp_path: Path) -> None:
+    path = tmp_path / "defaults.toml"
+    path.write_text(HEAD + QUADRATIC % "quadratic = 0.7", encoding="utf-8")
+    found = analyse(path, simulation=False, square=False)
+    assert found.constants.monotonicity == pytest.approx(1.4)
+
+
+def test_info_shows_parameters_and_expressions(game: Path) -> None:
+    shown = " ".join(command("info", game).stdout.split())
+    assert "expressions costs of all players" in shown
+    assert "expressions dynamics of players 2, 3" in shown
+    assert "price 12 0 to 100 price at no demand" in shown
+    assert "R 3 x 3, fixed" in shown
+    data = json.loads(command("info", game, "--json").stdout)
+    assert data["expressions"] == {"cost": [1, 2, 3], "dynamics": [2, 3], "disturbance": [2]}
+    assert data["named_parameters"][0]["max"] == 100.0
+    assert data["named_parameters"][1]["value"] == [5.0, 7.0, 6.0]
+
+
+def test_the_report_shows_the_expression_and_says_what_is_missing(fmu: Path, tmp_path: Path) -> None:
+    page = tmp_path / "page.html"
+    done = command("report", fmu, "--no-claims", "--output", page)
+    assert done.exit_code == 0, done.output
+    text = page.read_text(encoding="utf-8")
+    assert "<th>expression</th>" in text
+    assert "price * x[i] * exp(-0.1" in text
+    assert "No rate is predicted: player 1&#39;s cost has an expression" in text
