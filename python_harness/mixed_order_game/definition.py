@@ -61,7 +61,9 @@ def expressions_of(tables: Table) -> dict[str, tuple[int, ...]]:
     """The expressions of a game whose defaults are applied; empty if there are none."""
     found = {
         part: tuple(
-            number for number, player in enumerate(tables["player"], 1) if "expression" in player.get(part, {})
+            number
+            for number, player in enumerate(tables["player"], 1)
+            if "expression" in player.get(part, {})
         )
         for part in PARTS
     }

@@ -1,7 +1,7 @@
 """A game's parameters as arrays: from the FMU's variables and, for the unknown dynamics, its game file."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -36,8 +36,8 @@ class GameParameters:
     dynamics_linear: FloatArray  # (N, N, D), G_ij,l times dynamics_gain[i]
     dynamics_square: FloatArray  # (N, N, D), H_ij,l times dynamics_gain[i]
     disturbance_bound: FloatArray  # (N, D), |bias| + |amplitude|, at least max_t |d_il(t)|
-    expressions: Expressions = field(default_factory=dict)  # besides these coefficients; x* and g are then the FMU's
-    x_star: FloatArray | None = None  # (N, D), of the FMU; needed where costs have expressions
+    expressions: Expressions  # which costs, dynamics and disturbances these coefficients are not all of
+    x_star: FloatArray | None  # (N, D), of the FMU; needed where costs have expressions
 
     @property
     def players(self) -> int:
@@ -95,6 +95,7 @@ def game_parameters(model: Model, changes: Mapping[str, Value] | None = None) ->
         disturbance_bound=np.abs(array("disturbance_bias", N, D))
         + np.abs(array("disturbance_amplitude", N, D)),
         expressions=model.expressions,
+        x_star=None,
     )
 
 

@@ -11,8 +11,8 @@ from rich.box import SIMPLE_HEAD as LINES
 from rich.table import Table
 from rich.text import Text
 
-from .errors import ResultError
 from .definition import PARTS, NamedParameter, named_parameters
+from .errors import ResultError
 from .model import Model, provenance
 from .printing import show, standard_output
 from .results import Result
@@ -43,8 +43,14 @@ def print_info(model: Model, *, variables: bool = False) -> None:
     if parameters:
         table = Table("parameter", "value", "range", "unit", "meaning", box=LINES)
         for each in parameters:
-            cells = (each.name, _parameter_value(each), _range(each.min, each.max), each.unit, each.description)
-            table.add_row(*map(Text, cells))
+            row = (
+                each.name,
+                _parameter_value(each),
+                _range(each.min, each.max),
+                each.unit,
+                each.description,
+            )
+            table.add_row(*map(Text, row))
         show(table, console)
 
     sources = provenance(model)

@@ -16,7 +16,7 @@ UNKNOWN = ("dynamics", "disturbance")
 
 
 def recorded_for_unknown_term(model: Model) -> list[str] | None:
-    """What a run has to record for the unknown term besides x and u; None if the FMU does not expose it."""
+    """What a run has to record for the unknown term besides x and u; None if the FMU lacks it."""
     if not has_expressions(model.expressions, *UNKNOWN):
         return []
     rates = [
@@ -31,7 +31,7 @@ def unknown_term(game: GameParameters, result: Result) -> FloatArray:
     """g_i(x(t)) + d_i(t) + d_ext along a run whose parameters do not change, (T, N, D).
 
     g_i(x)_l = sum_j (G_ij,l x_jl + H_ij,l x_jl^2), d_il(t) = bias + amplitude sin(frequency t + phase).
-    Where these have expressions it is x_i' - u_i of order 1, v_i' - u_i of order 2, from recorded derivatives.
+    Of expressions it is x_i' - u_i of order 1, v_i' - u_i of order 2, from recorded derivatives.
     Raises ResultError if these were not recorded.
     """
     if has_expressions(game.expressions, *UNKNOWN):

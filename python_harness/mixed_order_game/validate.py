@@ -206,9 +206,10 @@ def _unmeasured(model: Model, game: GameParameters) -> list[Claim]:
     """Theorem 1's claims where the FMU does not show the unknown term; empty where it does."""
     if recorded_for_unknown_term(model) is not None:
         return []
+    unknown = has_expressions(game.expressions, *UNKNOWN)
     reason = (
-        f"The residual g + d - W'S cannot be measured: {has_expressions(game.expressions, *UNKNOWN)}, and an FMU "
-        'with expose = "outputs" has no time derivatives.'
+        f"The residual g + d - W'S cannot be measured: {unknown}, and an FMU that exposes outputs alone has "
+        "no time derivatives."
     )
     return nothing_to_observe(game, Verdict.NOT_COVERED, reason)
 

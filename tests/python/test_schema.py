@@ -200,7 +200,12 @@ ACCEPTED: dict[str, Edit] = {
     "expressions by coordinate": put({"expression": ["x[1,1]", "x[1,2]"]}, "player", 0, "dynamics"),
     "expression with l": put({"expression": "sin(l * t)"}, "player", 0, "disturbance"),
     "parameters": put(
-        {"A": 1, "b": [1.0, 2], "C": [[1.0], [2.0]], "d_2": {"value": 1.0, "max": 2, "unit": "m", "fixed": True}},
+        {
+            "A": 1,
+            "b": [1.0, 2],
+            "C": [[1.0], [2.0]],
+            "d_2": {"value": 1.0, "max": 2, "unit": "m", "fixed": True},
+        },
         "parameters",
     ),
     "guess": put({"guess": [1.0, [2.0, 3.0], 4.0, 5.0, 6.0]}, "equilibrium"),

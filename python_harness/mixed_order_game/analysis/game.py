@@ -73,8 +73,8 @@ def read_game(path: Path | str, changes: Mapping[str, Value] | None = None) -> A
 
     changes replace start values of an FMU.
 
-    Raises GameError for a file that is missing, breaks the definition of a game or has expressions, ModelError
-    for a broken FMU, VariableError for a change that the FMU would not take.
+    Raises GameError for a file that is missing, breaks the definition of a game or has expressions,
+    ModelError for a broken FMU, VariableError for a change that the FMU would not take.
     """
     path = source_of(path)
     if suffix_of(path) == ".fmu":
@@ -191,6 +191,8 @@ def _game_from_tables(tables: Table, path: Path) -> AnalysedGame:
         dynamics_linear=dynamics["linear"],
         dynamics_square=dynamics["square"],
         disturbance_bound=np.abs(part("disturbance", "bias")) + np.abs(part("disturbance", "amplitude")),
+        expressions={},
+        x_star=None,
     )
     return AnalysedGame(
         title=str(tables["title"]),

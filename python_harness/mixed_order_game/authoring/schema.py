@@ -57,7 +57,8 @@ def game_schema(*, players: int | None = None, dimension: int | None = None) -> 
         estimates = definitions["estimates"]["then"]
         estimates["anyOf"] = [of_players] if dimension == 1 else [of_players, of_coordinates]
         estimates["x-expected"] = (
-            f'"x0", a list of {players} estimates, one for each player, a list of {dimension} numbers, or one number'
+            f'"x0", a list of {players} estimates, one for each player, a list of {dimension} numbers, '
+            "or one number"
         )
         length = players * dimension
         definitions["vectorCenter"] |= {

@@ -23,8 +23,8 @@ def nash_equilibrium_exists(game: GameParameters) -> Claim:
             "nash_equilibrium",
             "All gradients vanish at x*, and no cost is concave there in its player's own action",
             Verdict.HOLDS,
-            f"The FMU's search found x*. As {expression}, it is not proved that x* is the only equilibrium, or "
-            "more than a local one.",
+            f"The FMU's search found x*. As {expression}, it is not proved that x* is the only equilibrium, "
+            "or more than a local one.",
         )
     verdict, reason = _judge(game)
     figures = {"m": monotonicity_constant(game)}

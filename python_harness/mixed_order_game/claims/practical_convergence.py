@@ -182,7 +182,10 @@ def _too_short(observed: Observed) -> Found:
     if least <= observed.limit:
         return None
     if not np.isfinite(least):
-        return Verdict.NOT_SETTLED, "How long a run is needed is not known: no rate of decay of the unperturbed loop is known."
+        return (
+            Verdict.NOT_SETTLED,
+            "How long a run is needed is not known: no rate of decay of the unperturbed loop is known.",
+        )
     return Verdict.NOT_SETTLED, (
         f"A run of {least:.4g} s is needed, with windows of three time constants and one period of the "
         f"disturbance; the limit is {observed.limit:.4g} s."

@@ -38,6 +38,9 @@ LARGEST_GROWTH = 50.0
 
 INTERVALS = 3000
 
+LEAST_SAMPLES = 20
+"""Samples from which a rate of decay can be read."""
+
 AGREEMENT = 1e-3
 """Difference between the run and the exact solution, as a part of the distance from x* still to come."""
 
@@ -47,7 +50,7 @@ RESOLVED = 1000.0
 
 @dataclass(frozen=True)
 class Spectrum:
-    """Where the slowest mode lies; abscissa is None if the loop is too large for its eigenvalues, or not linear."""
+    """Where the slowest mode lies; abscissa is None for a loop that is not linear, or too large."""
 
     abscissa: float | None  # 1/s
     marginal: bool  # zero to rounding
@@ -87,7 +90,9 @@ def unperturbed_loop_stable(game: GameParameters, spectrum: Spectrum) -> Claim:
 
     expression = has_expressions(game.expressions, "cost")
     if expression:
-        return claim(Verdict.NOT_COVERED, f"The loop is not linear, {expression}: it has no eigenvalues to judge.")
+        return claim(
+            Verdict.NOT_COVERED, f"The loop is not linear, {expression}: it has no eigenvalues to judge."
+        )
     if abscissa is None:
         states = 2 * game.players + game.players**2
         reason = f"The linear loop has {states:,} states a coordinate, too many for its eigenvalues."
@@ -200,19 +205,18 @@ def run_until_decay_is_seen(
 
 
 def slowest_rate_seen(run: Result | Ended) -> float:
-    """Rate in 1/s at which the largest |x - x*| of a run fell, while it was resolved: the slower of its last quarters.
+    """Rate in 1/s at which the largest |x - x*| of a run fell: the slower of its last quarters.
 
-    0 if the run ended early, or if the error did not fall by exp(TIME_CONSTANTS) in all.
+    Samples that are not resolved are left out. 0 if the run ended early, or if the error did not fall by
+    exp(TIME_CONSTANTS) in all.
     """
     if isinstance(run, Ended):
         return 0.0
     error = np.abs(run.x - run.x_star).max(axis=(1, 2))
     still = np.maximum.accumulate(error[::-1])[::-1]
     resolved = np.flatnonzero(still > _floor(run))
-    if resolved.size < 4:
-        return 0.0
-    end = int(resolved[-1])
-    if not still[end] < still[0] * np.exp(-TIME_CONSTANTS):
+    end = int(resolved[-1]) if resolved.size else 0
+    if end < LEAST_SAMPLES or not still[end] < still[0] * np.exp(-TIME_CONSTANTS):
         return 0.0
     quarters = [end // 2, 3 * end // 4, end]
     rates = -np.diff(np.log(still[quarters])) / np.diff(run.time[quarters])

@@ -86,7 +86,9 @@ def evidence_of_game(
                 stop_time=stop,
                 step=model.step,
                 tolerance=tolerance,
-                outputs=[*_signals(model, estimates=estimates), *(rates or [])] if estimates or rates else None,
+                outputs=[*_signals(model, estimates=estimates), *(rates or [])]
+                if estimates or rates
+                else None,
                 progress=None if progress is None else lambda time: progress(name, time / stop),
             )
 
