@@ -89,7 +89,8 @@ def fmu(game: Path) -> Path:
 
 
 def test_the_analysis_refuses(game: Path, fmu: Path) -> None:
-    told = f"the analysis reads costs, dynamics and disturbances as coefficients; {COST}"for call in (
+    told = f"the analysis reads costs, dynamics and disturbances as coefficients; {COST}"
+    for call in (
         lambda: analyse(game, simulation=False),
         lambda: analyse(game, simulation=False, square=False),
         lambda: analyse(fmu),
@@ -118,9 +119,7 @@ def test_what_reads_coefficients_refuses(function: object, fmu: Path) -> None:
 
 
 def test_tune_refuses(fmu: Path) -> None:
-    with pytest.raises(
-        mog.GameError, match="tune reads costs as coefficients; " + COST
-    ):
+    with pytest.raises(mog.GameError, match="tune reads costs as coefficients; " + COST):
         tune(fmu, 2.0)
 
 
