@@ -222,7 +222,8 @@ def _notes(game: GameParameters) -> list[str]:
         notes.append(f"The slowest rate is that of the unperturbed run: {cost}.")
     if disturbance:
         notes.append(
-            f"Whether the windows in which settling is judged span every period is not known: {disturbance}."
+            "Whether the windows in which settling is judged span every period, and their samples resolve it, "
+            f"is not known: {disturbance}."
         )
     return notes
 
