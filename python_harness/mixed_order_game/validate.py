@@ -222,7 +222,7 @@ def _notes(game: GameParameters) -> list[str]:
         notes.append(f"The slowest rate is that of the unperturbed run: {cost}.")
     if disturbance:
         notes.append(
-            "Whether the windows in which settling is judged span every period, and their samples resolve it, "
+            "Whether the windows in which settling is judged span every period, and samples resolve it, "
             f"is not known: {disturbance}."
         )
     return notes
