@@ -16,9 +16,9 @@ struct NamedParameter {
   std::string unit = {};
   Real min = -std::numeric_limits<Real>::infinity();
   Real max = std::numeric_limits<Real>::infinity();
-  bool fixed = false;     ///< part of the expressions, and no variable
+  bool fixed = false;          ///< part of the expressions, and no variable
   std::vector<int> size = {};  ///< none, one or two numbers: of a number, a list, a matrix
-  int first = 0;          ///< where its values begin, rows of a matrix one after the other
+  int first = 0;               ///< where its values begin, rows of a matrix one after the other
 
   [[nodiscard]] int count() const {
     int product = 1;
