@@ -29,24 +29,25 @@ std::unique_ptr<UnknownDynamics> PolynomialDynamics::clone() const {
 }
 
 void PolynomialDynamics::refresh() {
-  if (pattern_.entries() != 0) return;         // the game file fixes the terms
+  if (is_built_) return;                       // the game file fixes the terms
   std::map<int, std::pair<Real, Real>> terms;  // G and H by slot entry(i, l) N + j
   for (const auto& [slot, value] : coefficients.terms(linear)) terms[slot].first = value;
   for (const auto& [slot, value] : coefficients.terms(square)) terms[slot].second = value;
   std::erase_if(terms, [](const auto& term) { return term.second.first == 0.0 && term.second.second == 0.0; });
-  const int rows = pattern_.rows();
-  pattern_ = {};
+  SparseRows pattern;
   linear_.clear();
   square_.clear();
   auto term = terms.begin();
-  for (int row = 0; row < rows; ++row) {
+  for (int row = 0; row < no_velocities_.rows(); ++row) {
     for (; term != terms.end() && term->first / players_ == row; ++term) {
-      pattern_.column.push_back(row / players_ * players_ + term->first % players_);
+      pattern.column.push_back(row / players_ * players_ + term->first % players_);
       linear_.push_back(term->second.first);
       square_.push_back(term->second.second);
     }
-    pattern_.start.push_back(pattern_.entries());
+    pattern.start.push_back(pattern.entries());
   }
+  pattern_ = std::move(pattern);
+  is_built_ = true;
 }
 
 template <typename Scalar, typename Gain>

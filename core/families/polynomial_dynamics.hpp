@@ -27,6 +27,7 @@ class PolynomialDynamics : public UnknownDynamics {
   void values_as(const Scalar* x, Gain gain_of, Scalar* g) const;
 
   int players_;
+  bool is_built_ = false;
   SparseRows pattern_;
   SparseRows no_velocities_;
   std::vector<Real> linear_;  // along pattern_

@@ -277,7 +277,7 @@ const Refusal keys[] = {
     {"title = \"three players\"", "", "title is missing, expected text"},
     {"title = \"three players\"\n", "colour = \"red\"\n",
      "\"colour\" is an unknown key of the game definition, expected one of title, dimension, expose, strategy, gains, "
-     "rbf, graph, player"},
+     "rbf, graph, parameters, defaults, equilibrium, player"},
     {"k1 = 10.0\n", "", "gains.k1 is missing, expected a positive number"},
     {"k1 = 10.0", "k5 = 10.0",
      "\"k5\" is an unknown key of gains, expected one of k1, k2, k3, k4, beta, delta, epsilon"},
@@ -294,11 +294,12 @@ const Refusal keys[] = {
      "player[2].x0 is missing, expected a list of 2 numbers or one number that stands for all of them"},
     {"constant = 7.0", "constants = 7.0",
      "\"constants\" is an unknown key of player[1].cost, the closest known key is constant"},
-    {"square = [", "cubic = [", "\"cubic\" is an unknown key of player[2].dynamics, expected one of linear, square"},
+    {"square = [", "cubic = [",
+     "\"cubic\" is an unknown key of player[2].dynamics, expected one of expression, linear, square"},
     {"phase = [", "fase = [", "\"fase\" is an unknown key of player[3].disturbance, the closest known key is phase"},
     {"title = ", "this_key_is_so_long_that_it_must_be_cut_somewhere = ",
      "\"this_key_is_so_long_that_it_must_be_cut_...\" is an unknown key of the game definition, expected one of title, "
-     "dimension, expose, strategy, gains, rbf, graph, player"},
+     "dimension, expose, strategy, gains, rbf, graph, parameters, defaults, equilibrium, player"},
 };
 INSTANTIATE_TEST_SUITE_P(Keys, GameDefinitionRefuses, ::testing::ValuesIn(keys));
 
@@ -353,8 +354,10 @@ const Refusal lengths[] = {
      "player[1].cost.linear is [0.5], expected a list of 2 numbers or one number that stands for all of them"},
     {"v0 = -1", "v0 = [-1]",
      "player[2].v0 is [-1], expected a list of 2 numbers or one number that stands for all of them"},
-    {"y0 = [[1.0, 2.0], 3.0, [4.0, 5.0]]", "y0 = [3.0, 4.0]",
-     "player[1].y0 is [3, 4], expected a list of 3 estimates, one for each player, or one number"},
+    {"y0 = [[1.0, 2.0], 3.0, [4.0, 5.0]]", "y0 = [[3.0], [4.0]]",
+     "player[1].y0 is a list of 2, expected \"x0\", a list of 3 estimates, one for each player, a list of 2 numbers, "
+     "or one "
+     "number"},
     {"y0 = [[1.0, 2.0], 3.0, [4.0, 5.0]]", "y0 = [3.0, 4.0, [1.0]]",
      "player[1].y0[3] is [1], expected a list of 2 numbers or one number that stands for all of them"},
     {"[3, 2.0]], square", "[3, [1.0, 2.0, 3.0]]], square",
