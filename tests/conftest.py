@@ -1,11 +1,18 @@
 """Fixtures of the Python package's tests: FMUs of the paper's example and of the test games."""
 
+import signal
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from mixed_order_game import build_fmu, default_game
+
+# under nohup or in the background some are ignored, and commands would ignore them, too
+if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+if signal.getsignal(signal.SIGHUP) == signal.SIG_IGN:
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 GAMES = Path(__file__).parent / "reference" / "games"
 
