@@ -4,7 +4,6 @@
 
 #include <cmath>
 #include <cstdlib>
-#include <regex>
 
 #include "errors.hpp"
 #include "game.hpp"
@@ -140,8 +139,6 @@ TEST(Stress, NoToleranceCostsTenTimesWhatItsNeighboursDo) {
 }
 
 TEST(Stress, EveryRunEndsOrSaysWhyItCannot) {
-  const std::regex reason(
-      R"(the integration stopped at t = \S+ s: player \d+ grows without bound: [xvzy]\[[0-9,]+\] has reached \S+)");
   int failed = 0;
   for (std::uint64_t seed = 1; seed <= games(30); ++seed) {
     const PlainGame game = wild_game(seed);
@@ -149,8 +146,12 @@ TEST(Stress, EveryRunEndsOrSaysWhyItCannot) {
       const Outcome outcome = run(game, tolerance, 2.0);
       if (outcome.message.empty()) continue;
       ++failed;
-      EXPECT_TRUE(std::regex_match(outcome.message, reason))
-          << "game " << seed << " at " << tolerance << ": " << outcome.message;
+      std::size_t at_part = 0;
+      for (const char* part :
+           {"the integration stopped at t = ", " s: player ", " grows without bound: ", " has reached "}) {
+        at_part = outcome.message.find(part, at_part);
+        ASSERT_NE(at_part, std::string::npos) << "game " << seed << " at " << tolerance << ": " << outcome.message;
+      }
     }
   }
   RecordProperty("failed", failed);
