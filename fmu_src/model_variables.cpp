@@ -196,17 +196,17 @@ class ModelVariables::Builder {
   void add_coefficients() {
     const auto families = game_.parameters.families();
     for (std::size_t number = 0; number < families.size(); ++number) {
-      const std::span<const Coefficient> declared = families[number]->coefficients.declared();
-      for (int k = 0; k < static_cast<int>(declared.size()); ++k) {
-        if (declared[at(k)].variable != nullptr) add_coefficient(number, k, declared[at(k)]);
+      const std::span<const Coefficient> coefficients = families[number]->coefficients.declared();
+      for (int k = 0; k < static_cast<int>(coefficients.size()); ++k) {
+        if (coefficients[at(k)].variable != nullptr) add_coefficient(number, k, coefficients[at(k)]);
       }
     }
   }
-  void add_coefficient(std::size_t game_family, int number, const Coefficient& declared) {
-    Family family = parameter(declared.variable, declared.description, Variability::tunable);
-    family.declared_type = declared.declared_type;
-    family.unit = declared.unit;
-    family.moves_equilibrium = declared.moves_equilibrium;
+  void add_coefficient(std::size_t game_family, int number, const Coefficient& coefficient) {
+    Family family = parameter(coefficient.variable, coefficient.description, Variability::tunable);
+    family.declared_type = coefficient.declared_type;
+    family.unit = coefficient.unit;
+    family.moves_equilibrium = coefficient.moves_equilibrium;
     family.read = [=](const View& view, int slot) {
       return view.settings->parameters.families()[game_family]->coefficients[number][at(slot)];
     };
@@ -215,7 +215,8 @@ class ModelVariables::Builder {
     };
     family.game_family = static_cast<int>(game_family);
     family.coefficient = number;
-    add(std::move(family), elements(declared.indices, game_.parameters.families()[game_family]->coefficients[number]));
+    add(std::move(family),
+        elements(coefficient.indices, game_.parameters.families()[game_family]->coefficients[number]));
   }
   // Those of the game file; their order is that of the file.
   void add_named_parameters() {
