@@ -14,7 +14,7 @@
 #include <thread>
 
 #include "errors.hpp"
-#include "fmi_logger.hpp"
+#include "logger.hpp"
 #include "resource_location.hpp"
 #include "slave.hpp"
 

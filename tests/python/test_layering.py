@@ -48,18 +48,24 @@ def test_only_the_integrator_knows_sundials(path: Path) -> None:
     assert allowed or [name for name in includes(path) if solver.search(name)] == []
 
 
+VERSION_ROOM = re.compile(r"fmu_src/fmi(\d)/")
+
+
 @pytest.mark.parametrize("path", named(path for folder in ("core", "fmu_src") for path in sources(folder)))
-def test_only_the_fmi_functions_know_the_fmi_headers(path: Path) -> None:
-    allowed = re.fullmatch(r"fmi\d_functions\w*", path.stem) is not None
-    assert allowed or [name for name in includes(path) if re.match(r"fmi\d\w*\.h$", name)] == []
-
-
-def test_one_fmi_version_does_not_know_another() -> None:
-    for path in sources("fmu_src"):
-        own = re.fullmatch(r"fmi(\d)_functions\w*", path.stem)
-        if own:
-            versions = re.findall(r"\bfmi(\d)", " ".join(includes(path)))
-            assert set(versions) <= {own[1]}, path
+def test_only_the_room_of_a_version_of_fmi_knows_it(path: Path) -> None:
+    room = VERSION_ROOM.search(path.as_posix())
+    rooms = [room for room in (ROOT / "fmu_src").iterdir() if re.fullmatch(r"fmi\d", room.name)]
+    if room:
+        versions = re.findall(r"\bfmi(\d)", " ".join(includes(path)))
+        assert set(versions) <= {room[1]}
+        others = [
+            header.name for other in rooms if other.name != f"fmi{room[1]}" for header in other.glob("*.hpp")
+        ]
+    else:
+        assert [name for name in includes(path) if re.match(r"fmi\d\w*\.h$", name)] == []
+        assert re.findall(r"\bfmi\d\w*", code(path)) == []
+        others = [header.name for other in rooms for header in other.glob("*.hpp")]
+    assert [name for name in includes(path) if Path(name).name in others] == []
 
 
 def test_the_python_package_imports_packaging_from_the_standard_library_alone() -> None:

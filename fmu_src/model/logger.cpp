@@ -1,4 +1,4 @@
-#include "fmi_logger.hpp"
+#include "logger.hpp"
 
 #include <algorithm>
 
@@ -13,17 +13,17 @@ std::string harmless(std::string_view text) {
   return clean;
 }
 
-void FmiLogger::error(std::string_view message) const noexcept { tell(Severity::error, error_category, message); }
+void Logger::error(std::string_view message) const noexcept { tell(Severity::error, error_category, message); }
 
-void FmiLogger::event(std::string_view message) const noexcept {
+void Logger::event(std::string_view message) const noexcept {
   if (tells_events()) tell(Severity::ok, event_category, message);
 }
 
-void FmiLogger::discard(std::string_view message) const noexcept {
+void Logger::discard(std::string_view message) const noexcept {
   if (tells_events()) tell(Severity::discard, discard_category, message);
 }
 
-void FmiLogger::tell(Severity severity, const char* category, std::string_view message) const noexcept {
+void Logger::tell(Severity severity, const char* category, std::string_view message) const noexcept {
   if (!sink_) return;
   std::string clean;
   try {
@@ -36,7 +36,7 @@ void FmiLogger::tell(Severity severity, const char* category, std::string_view m
   }
 }
 
-bool FmiLogger::choose(bool on, std::span<const char* const> categories) {
+bool Logger::choose(bool on, std::span<const char* const> categories) {
   bool events = categories.empty();
   for (const char* name : categories) {
     const auto known = [&](const LogCategory& category) {

@@ -1,4 +1,4 @@
-#include "lifecycle.hpp"
+#include "legal_calls.hpp"
 
 #include <iterator>
 
@@ -6,17 +6,7 @@ namespace mixed_order_game {
 
 namespace {
 
-constexpr unsigned bit(Phase phase) { return 1U << static_cast<unsigned>(phase); }
-
-constexpr unsigned fresh = bit(Phase::instantiated);
-constexpr unsigned initializing = bit(Phase::initialization);
-constexpr unsigned stepping = bit(Phase::step_complete);
-constexpr unsigned at_event = bit(Phase::event_mode);
-constexpr unsigned continuous = bit(Phase::continuous_time_mode);
-constexpr unsigned running = stepping | at_event | continuous;
-constexpr unsigned ended = bit(Phase::terminated);
-constexpr unsigned failed = bit(Phase::error);
-constexpr unsigned always = fresh | initializing | running | ended | failed;
+using namespace phase_set;
 
 constexpr unsigned bit(Interface interface) { return 1U << static_cast<unsigned>(interface); }
 
@@ -71,28 +61,6 @@ constexpr CallRule call_rules[] = {
     {Call::get_nominals, always, 0, model_exchange},
 };
 
-// Notes 1 and 3 to 6: which variables the calls that set values may name.
-struct VariableRule {
-  Causality causality;
-  Variability variability;
-  unsigned standard;
-  unsigned beyond = 0;
-};
-constexpr VariableRule variable_rules[] = {
-    {Causality::parameter, Variability::fixed, fresh | initializing},
-    {Causality::parameter, Variability::tunable, fresh | initializing | stepping | at_event},
-    // importers set all start values at once
-    {Causality::input, Variability::continuous, initializing | running, fresh},
-};
-// By model exchange the importer holds the states (note 5, since 2.0.1); one that never leaves event mode sets them
-// there, beyond the standard.
-constexpr unsigned states_settable = continuous | at_event;
-
-constexpr std::string_view phase_names[] = {"instantiated", "initialization mode",  "step complete",
-                                            "event mode",   "continuous-time mode", "terminated",
-                                            "error"};
-static_assert(std::size(phase_names) == phases);
-
 constexpr bool in_order_of_calls() {
   for (std::size_t k = 0; k < std::size(call_rules); ++k) {
     if (static_cast<std::size_t>(call_rules[k].call) != k) return false;
@@ -103,41 +71,7 @@ static_assert(in_order_of_calls());
 
 constexpr const CallRule& rule_of(Call call) { return call_rules[static_cast<std::size_t>(call)]; }
 
-/// The phases in which a variable of this family may be set.
-unsigned settable(const Family& family) {
-  if (family.state >= 0) return states_settable;
-  for (const VariableRule& rule : variable_rules) {
-    if (rule.causality == family.causality && rule.variability == family.variability) {
-      return rule.standard | rule.beyond;
-    }
-  }
-  return 0;
-}
-
-/// The phases that an instance can be in; only an integration of its own can fail.
-constexpr unsigned phases_of(Interface interface) {
-  return interface == Interface::co_simulation ? always & ~(at_event | continuous) : always & ~(stepping | failed);
-}
-
 }  // namespace
-
-std::string_view kind_of(const Family& family) {
-  switch (family.causality) {
-    case Causality::parameter:
-      return family.variability == Variability::fixed ? "a fixed parameter" : "a tunable parameter";
-    case Causality::calculated_parameter:
-      return "a calculated parameter";
-    case Causality::input:
-      return "an input";
-    case Causality::output:
-      return "an output";
-    case Causality::local:
-      return family.variability == Variability::constant ? "a constant" : "a local variable";
-    case Causality::independent:
-      return "the independent variable";
-  }
-  return "";
-}
 
 bool is_legal(Call call, Phase phase) {
   const CallRule& rule = rule_of(call);
@@ -150,30 +84,10 @@ std::string legal_phases(Call call, Interface interface) {
   std::string text;
   for (int phase = 0; phase < phases; ++phase) {
     const auto one = static_cast<Phase>(phase);
-    if (!is_legal(call, one) || (phases_of(interface) & bit(one)) == 0) continue;
-    text += (text.empty() ? "" : " or ") + std::string(phase_names[phase]);
+    if (!is_legal(call, one) || (of(interface) & bit(one)) == 0) continue;
+    text += (text.empty() ? "" : " or ") + std::string(name_of(one));
   }
   return text.empty() ? "no state" : text;
-}
-
-bool may_be_set(const Family& family, Phase phase) { return (settable(family) & bit(phase)) != 0; }
-
-std::string why_not_settable(const Family& family, Phase phase, Interface interface) {
-  const bool some_time = (settable(family) & phases_of(interface)) != 0;
-  const std::string_view kind = some_time && family.state >= 0 ? "a state" : kind_of(family);
-  std::string text = "is " + std::string(kind);
-  if (some_time) {
-    text += ", which cannot be set in the state " + std::string(name_of(phase));
-  } else {
-    text += " and cannot be set";
-  }
-  return text;
-}
-
-std::string_view name_of(Phase phase) { return phase_names[static_cast<std::size_t>(phase)]; }
-
-std::string_view name_of(Interface interface) {
-  return interface == Interface::co_simulation ? "co-simulation" : "model exchange";
 }
 
 }  // namespace mixed_order_game

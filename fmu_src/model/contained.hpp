@@ -1,6 +1,5 @@
-// The one wrapper around every entry point: checks the instance and that the call is legal now, keeps every exception
-// inside, tells the reason, and keeps the host's floating-point environment out of the calculation and untouched, for
-// its logger too.
+// What every entry point of any version of FMI runs in: it keeps every exception inside, tells the reason, and keeps
+// the host's floating-point environment out of the calculation and untouched, for its logger too.
 #pragma once
 
 #if defined(__x86_64__)
@@ -19,17 +18,17 @@
 #include <unordered_map>
 #include <utility>
 
-#include "fmi_logger.hpp"
 #include "instance.hpp"
+#include "logger.hpp"
 
 namespace mixed_order_game {
 
 /// An instance as an entry point sees it.
 struct Component {
-  Component(FmiLogger with_logger, Model model, Interface interface)
+  Component(Logger with_logger, Model model, Interface interface)
       : logger(std::move(with_logger)), instance(std::move(model), interface) {}
 
-  FmiLogger logger;
+  Logger logger;
   Instance instance;
   /// Saved states that the importer holds, so that a stale or foreign handle is refused.
   std::unordered_map<const void*, std::unique_ptr<Snapshot>> saved_states;
@@ -77,7 +76,7 @@ enum class Outcome { done, discarded, refused };
 
 /// Runs action(). Whatever it throws is told to the logger.
 template <typename Action>
-Outcome contained(const FmiLogger& logger, const char* function, Action action) noexcept {
+Outcome contained(const Logger& logger, const char* function, Action action) noexcept {
   Outcome outcome = Outcome::refused;
   std::string reason;
   try {
@@ -102,44 +101,6 @@ Outcome contained(const FmiLogger& logger, const char* function, Action action) 
   } else {
     logger.error(reason);
   }
-  return outcome;
-}
-
-/// Runs action(component) when the call is legal.
-template <typename Action>
-Outcome guarded(void* handle, Call call, const char* function, Action action) noexcept {
-  if (handle == nullptr) return Outcome::refused;
-  auto& component = *static_cast<Component*>(handle);
-  return contained(component.logger, function, [&] {
-    const Phase phase = component.instance.phase();
-    const Interface interface = component.instance.interface();
-    if (!belongs_to(call, interface)) {
-      const Interface other =
-          interface == Interface::co_simulation ? Interface::model_exchange : Interface::co_simulation;
-      throw Error("belongs to " + std::string(name_of(other)) + ", and this instance was made for " +
-                  std::string(name_of(interface)));
-    }
-    if (!is_legal(call, phase)) {
-      throw Error("not allowed in the state " + std::string(name_of(phase)) + ", only in " +
-                  legal_phases(call, interface));
-    }
-    action(component);
-  });
-}
-
-/// The same; when the call was done and events are told, the text that event(component) makes is one.
-template <typename Action, typename Event>
-Outcome guarded(void* handle, Call call, const char* function, Action action, Event event) noexcept {
-  const Outcome outcome = guarded(handle, call, function, std::move(action));
-  if (outcome != Outcome::done) return outcome;
-  const auto& component = *static_cast<const Component*>(handle);
-  if (!component.logger.tells_events()) return outcome;
-  std::string text;
-  try {
-    text = event(component);
-  } catch (...) {  // memory is short, but the call was done
-  }
-  if (!text.empty()) component.logger.event(text);
   return outcome;
 }
 

@@ -1,27 +1,12 @@
-// Which call is legal in which state of an instance, and when which kind of variable may be set.
+// Which call of FMI 2.0 is legal in which state of an instance.
 #pragma once
 
 #include <cstdint>
 #include <string>
-#include <string_view>
 
-#include "model_variables.hpp"
+#include "lifecycle.hpp"
 
 namespace mixed_order_game {
-
-/// What an instance was made for.
-enum class Interface : std::uint8_t { co_simulation, model_exchange };
-
-enum class Phase : std::uint8_t {
-  instantiated,
-  initialization,
-  step_complete,  ///< co-simulation
-  event_mode,     ///< model exchange
-  continuous_time_mode,
-  terminated,
-  error
-};
-inline constexpr int phases = 7;
 
 enum class Call : std::uint8_t {
   set_debug_logging,
@@ -61,15 +46,5 @@ bool is_legal(Call call, Phase phase);
 bool belongs_to(Call call, Interface interface);
 /// As in "instantiated or initialization mode".
 std::string legal_phases(Call call, Interface interface);
-
-/// As in "a tunable parameter".
-std::string_view kind_of(const Family& family);
-
-bool may_be_set(const Family& family, Phase phase);
-/// Why a variable of this family cannot be set now.
-std::string why_not_settable(const Family& family, Phase phase, Interface interface);
-
-std::string_view name_of(Phase phase);
-std::string_view name_of(Interface interface);
 
 }  // namespace mixed_order_game

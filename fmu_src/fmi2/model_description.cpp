@@ -4,7 +4,7 @@
 #include <set>
 #include <sstream>
 
-#include "fmi_logger.hpp"
+#include "logger.hpp"
 #include "model_structure.hpp"
 
 namespace mixed_order_game {

@@ -43,7 +43,7 @@ Value& required(Value* value, const char* name) {
   return *value;
 }
 
-FmiLogger make_logger(const fmi2CallbackFunctions* callbacks, const std::string& instance_name, bool on) {
+Logger make_logger(const fmi2CallbackFunctions* callbacks, const std::string& instance_name, bool on) {
   if (callbacks == nullptr || callbacks->logger == nullptr) return {nullptr, on};
   return {[logger = callbacks->logger, environment = callbacks->componentEnvironment, instance_name](
               Severity severity, const char* category, const char* message) {
@@ -113,7 +113,7 @@ fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2Str
                               fmi2Boolean /*visible*/, fmi2Boolean loggingOn) {
   fmi2Component made = nullptr;
   try {
-    const FmiLogger logger = make_logger(functions, text_or(instanceName, model_identifier), loggingOn != fmi2False);
+    const Logger logger = make_logger(functions, text_or(instanceName, model_identifier), loggingOn != fmi2False);
     contained(logger, "fmi2Instantiate", [&] {
       const std::string path = path_of(text_or(fmuResourceLocation, "")) + "/game.toml";
       const std::string toml = content_of(path);

@@ -31,12 +31,12 @@ inline constexpr const char* event_category = log_categories[2].name;
 /// turned into blanks.
 std::string harmless(std::string_view text);
 
-class FmiLogger {
+class Logger {
  public:
   using Sink = std::function<void(Severity, const char* category, const char* message)>;
 
   /// An empty sink is fine: nothing is said then.
-  FmiLogger(Sink sink, bool on) : sink_(std::move(sink)), events_on_(on) {}
+  Logger(Sink sink, bool on) : sink_(std::move(sink)), events_on_(on) {}
 
   // A message that is empty, or for which there is no memory, says that memory is short.
 
