@@ -12,6 +12,7 @@ from mixed_order_game import Simulator, build_fmu, read_model
 from mixed_order_game.authoring import Recipe, check_game, new_game
 from mixed_order_game.parameters import game_parameters
 from mixed_order_game.spectrum import linear_loop, monotonicity_constant, spectral_abscissa
+from tests.games_by_hand import BY_HAND
 from tests.oracle.equilibrium import nash_equilibrium, strong_monotonicity_constant
 from tests.oracle.game import read_game
 
@@ -51,7 +52,8 @@ LITERATURE: dict[str, tuple[int, int, Callable[[FloatArray, int], FloatArray]]] 
     "cournot_two_markets": (6, 2, cournot_two_markets),
     "mobile_sensors": (6, 2, mobile_sensors),
 }
-NAMES = [*LITERATURE, "opinion_formation"]
+COEFFICIENTS = [*LITERATURE, "opinion_formation"]
+NAMES = [*COEFFICIENTS, *BY_HAND]
 
 
 def own_gradients(cost: Callable[[FloatArray, int], FloatArray], x: FloatArray) -> FloatArray:
@@ -152,7 +154,7 @@ def test_opinion_formation_is_the_game_that_its_file_says_it_is() -> None:
     assert text[text.index("[[player]]") :] == made[made.index("[[player]]") :]
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", COEFFICIENTS)
 def test_is_valid_stable_and_converges_through_the_fmu(
     name: str, fmu_of_example: Callable[[str], Path]
 ) -> None:
@@ -176,3 +178,32 @@ def test_is_valid_stable_and_converges_through_the_fmu(
     assert np.abs(plain.x[-1] - expected).max() < 1e-6
     assert robust.W_norm2.max() <= game.W_max * (1.0 + 1e-9)
     assert bare.largest_error(late_time) > 20.0 * robust.largest_error(late_time)
+
+
+def test_powers_solve_the_linear_system_of_the_source(fmu_of_example: Callable[[str], Path]) -> None:
+    h, price, utility = (
+        np.array(row) for row in ([1, 0.8, 0.6, 0.9], [1, 0.8, 0.6, 0.9], [2.5, 2, 1.6, 2.2])
+    )
+    received = np.linalg.solve(np.ones((4, 4)) + 7.0 * np.eye(4), 8.0 * utility * h / price - 0.5)
+    result = Simulator(fmu_of_example("power_control")).run(stop_time=0.02)
+    np.testing.assert_allclose(result.x_star.ravel(), received / h, atol=1e-12)
+
+
+@pytest.mark.parametrize("name", BY_HAND)
+def test_with_expressions_is_valid_and_converges_through_the_fmu(
+    name: str, fmu_of_example: Callable[[str], Path]
+) -> None:
+    """To the point that the source's formulas have by hand, which test_general_games compares."""
+    assert check_game(GAMES / f"{name}.toml") == ()
+    with Simulator(fmu_of_example(name)) as simulator:
+        robust = simulator.run(outputs=["x", "nash_error"])
+        late_time = 0.8 * robust.time[-1]
+        late = robust.window(late_time, np.inf)
+        assert np.abs(robust.x[late] - robust.x_star).max() < 0.01
+        if name == "two_hundred_households":  # which takes long
+            return
+        off = {"robust": False, "perturbed": False}
+        plain = simulator.run(start_values=off, outputs=["x"], tolerance=1e-10)
+        bare = simulator.run(start_values={"robust": False}, outputs=["x", "nash_error"])
+    assert np.abs(plain.x[-1] - plain.x_star).max() < 1e-6
+    assert bare.largest_error(late_time) > 10.0 * robust.largest_error(late_time)

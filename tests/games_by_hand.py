@@ -1,0 +1,243 @@
+"""The example games that have expressions, typed by hand from the formulas of their sources.
+
+No expression is read. In costs x[..., i, j, l] is x_jl as player i sees it.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+from scipy.special import erf
+
+from tests.oracle.general_loop import Functions, own
+from tests.oracle.paper_equations import Numbers
+
+GAMES = Path(__file__).resolve().parents[1] / "modelDescription" / "games"
+
+
+def column(*entries: Numbers | float) -> Numbers:
+    """One entry for each player of a game with D = 1."""
+    return np.array(entries)[:, np.newaxis]
+
+
+def cournot_isoelastic() -> Functions:
+    c, b = np.array([10.0, 8.0, 6.0, 4.0, 2.0]), np.array([1.2, 1.1, 1.0, 0.9, 0.8])
+
+    def costs(x: Numbers) -> Numbers:
+        quantity, total = 10.0 * own(x)[..., 0], 10.0 * x[..., 0].sum(axis=-1)
+        price = 5000.0 ** (1.0 / 1.1) * total ** (-1.0 / 1.1)
+        production = c * quantity + b / (1.0 + b) * 5.0 ** (-1.0 / b) * quantity ** ((1.0 + b) / b)
+        return np.asarray(production - quantity * price)
+
+    def dynamics(x: Numbers, v: Numbers) -> Numbers:
+        x1, x2, x3, x4, x5 = x[:, 0]
+        return column(
+            0.2 * np.sin(x1) * x2,
+            0.1 * x2 - 0.3 * np.tanh(v[1, 0]),
+            0.5 * np.log(1.0 + x3**2),
+            0.4 * np.cos(x3 - x4),
+            -0.2 * x5 + 0.1 * x1,
+        )
+
+    def disturbances(t: float) -> Numbers:
+        return column(
+            np.sin(t),
+            1.2 * np.sin(0.7 * t + np.sin(0.4 * t)),
+            0.8 * np.sin(1.7 * t) + 0.4,
+            np.sin(1.3 * t),
+            1.5 * np.exp(-0.1 * t) * np.cos(2.0 * t),
+        )
+
+    return Functions(costs, dynamics, disturbances)
+
+
+def electric_vehicles() -> Functions:
+    base, wanted = np.array([14.0, 8.0, 11.0]), np.array([9.0, 6.0, 12.0, 7.5, 10.5, 6.0])
+
+    def costs(x: Numbers) -> Numbers:
+        charge = own(x)
+        price = 15.0 * ((base + x.sum(axis=-2)) / 40.0) ** 1.5
+        even = np.sum((charge - wanted[:, np.newaxis] / 3.0) ** 2, axis=-1)
+        short = (charge.sum(axis=-1) - wanted) ** 2
+        return np.asarray(np.sum(price * charge, axis=-1) + 0.2 * even + short)
+
+    def dynamics(x: Numbers, v: Numbers) -> Numbers:
+        g = 0.1 * x * np.tanh(x)
+        g[3] = -0.2 * v[3] * np.sqrt(0.01 + v[3] ** 2) + 0.1 * x[0]
+        return g
+
+    def disturbances(t: float) -> Numbers:
+        i, hour = np.arange(1, 7)[:, np.newaxis], np.arange(1, 4)
+        return 1.5 * np.sin((0.5 + 0.2 * i) * t + hour)
+
+    return Functions(costs, dynamics, disturbances)
+
+
+def power_control() -> Functions:
+    h, price = np.array([1.0, 0.8, 0.6, 0.9]), np.array([1.0, 0.8, 0.6, 0.9])
+    utility = np.array([2.5, 2.0, 1.6, 2.2])
+
+    def costs(x: Numbers) -> Numbers:
+        received, power = x[..., 0] * h, own(x)[..., 0]
+        interference = received.sum(axis=-1) - power * h
+        ratio = 8.0 * h * power / (0.5 + interference)
+        return np.asarray(price * power - utility * np.log(1.0 + ratio))
+
+    def dynamics(x: Numbers, v: Numbers) -> Numbers:
+        x1, x2, x3, x4 = x[:, 0]
+        return column(
+            0.3 * np.sin(2.0 * x1),
+            -0.2 * v[1, 0] + 0.1 * x1 * x2,
+            0.2 * x3 - 0.1 * x4,
+            0.2 * np.arctan(x3 * x4),
+        )
+
+    def disturbances(t: float) -> Numbers:
+        return column(
+            1.5 * np.sin(2.0 * t),
+            1.2 * np.sin(1.1 * t + 0.5),
+            0.4 * np.sin(3.0 * t) + 0.2 * np.cos(np.sqrt(2.0) * t),
+            np.sin(0.7 * t) + 0.2,
+        )
+
+    return Functions(costs, dynamics, disturbances)
+
+
+def rate_allocation() -> Functions:
+    capacity, w = np.array([10.0, 8.0, 12.0]), np.array([3.0, 2.0, 4.0, 2.5, 3.5, 3.0])
+    routes = [[0], [0, 1], [1, 2], [2], [0, 2], [1, 2]]
+    uses = np.array([[link in route for route in routes] for link in range(3)], dtype=float)
+
+    def costs(x: Numbers) -> Numbers:
+        load = x[..., 0] @ uses.T  # as player i sees it, of each link
+        delay = 1.0 / (capacity - load)
+        return np.asarray(np.sum(3.0 * uses.T * delay, axis=-1) - w * np.log(1.0 + own(x)[..., 0]))
+
+    def dynamics(x: Numbers, v: Numbers) -> Numbers:
+        x1, x2, x3, x4, x5, x6 = x[:, 0]
+        return column(
+            0.1 * x1,
+            0.2 * np.sin(x1 * x2),
+            0.1 * x3**2 / (1.0 + x6**2),
+            -0.3 * v[3, 0] * np.tanh(v[3, 0] / 0.1),
+            0.1 * x4 - 0.2 * x5,
+            0.2 * np.exp(-x6) * x5,
+        )
+
+    def disturbances(t: float) -> Numbers:
+        return 2.0 * np.sin((0.6 + 0.3 * np.arange(1, 7)[:, np.newaxis]) * t)
+
+    return Functions(costs, dynamics, disturbances)
+
+
+def energy_peak_price() -> Functions:
+    h, w = np.array([5.0, 5.5, 6.0, 6.5, 7.0]), np.array([1.0, 1.2, 0.8, 1.0, 1.1])
+
+    def costs(x: Numbers) -> Numbers:
+        load, total = own(x)[..., 0], x[..., 0].sum(axis=-1)
+        return np.asarray(w * (load - h) ** 2 + (1.0 + 4.0 * (total / 20.0) ** 3) * load)
+
+    def dynamics(x: Numbers, v: Numbers) -> Numbers:
+        x1, x2, x3, x4, x5 = x[:, 0]
+        return column(
+            0.1 * x1,
+            0.3 * erf(x1 - x2),
+            0.1 * np.sqrt(1.0 + x3**2),
+            -0.2 * np.sinh(0.2 * v[3, 0]),
+            0.2 * x4 * np.cos(x5),
+        )
+
+    def disturbances(t: float) -> Numbers:
+        return column(
+            np.sin(t),
+            1.2 * np.sin(0.8 * t + 0.5),
+            0.8 * np.sin(1.6 * t) + 0.5,
+            1.5 * np.sin(0.5 * t),
+            np.sin(2.0 * t + 1.0),
+        )
+
+    return Functions(costs, dynamics, disturbances)
+
+
+def source_seeking() -> Functions:
+    s = np.array([(0.0, 2.0), (1.9, 0.6), (1.2, -1.6), (-1.2, -1.6), (-1.9, 0.6)])
+    players = np.arange(5)
+
+    def costs(x: Numbers) -> Numbers:
+        here = own(x)
+        field = 8.0 * np.exp(-np.sum((here - s) ** 2, axis=-1) / (2.0 * 2.5**2))
+        before, behind = x[..., players, (players + 1) % 5, :], x[..., players, (players - 1) % 5, :]
+        distances = np.sum((here - before) ** 2 + (here - behind) ** 2, axis=-1)
+        return np.asarray(0.12 * distances - field)
+
+    def dynamics(x: Numbers, v: Numbers) -> Numbers:
+        del v
+        turning = 0.3 * np.sin(x[:, :1]) * np.cos(x[:, 1:])
+        return np.asarray(turning + 0.1 * np.roll(x, -1, axis=0))
+
+    def disturbances(t: float) -> Numbers:
+        i = np.arange(1, 6)[:, np.newaxis]
+        return np.cos((0.7 + 0.2 * i) * t + 1.5 * np.array([1, 2]))
+
+    return Functions(costs, dynamics, disturbances)
+
+
+def rivalling_pairs() -> Functions:
+    p = np.array([(1.0, -0.5), (-1.5, 1.0), (0.5, 2.0), (-1.0, -1.5)])
+    S = np.zeros((4, 4))
+    for i, j, gain in ((1, 2, 2.0), (1, 3, -1.5), (2, 4, 1.8), (3, 4, -2.2), (1, 4, 0.6)):
+        S[i - 1, j - 1], S[j - 1, i - 1] = gain, -gain
+
+    def costs(x: Numbers) -> Numbers:
+        here = own(x)
+        alone = np.sum(1.5 * np.log(np.cosh(here - p)) + 0.4 * (here - p) ** 2, axis=-1)
+        return np.asarray(alone + np.sum(S * np.sum(here[..., np.newaxis, :] * x, axis=-1), axis=-1))
+
+    def dynamics(x: Numbers, v: Numbers) -> Numbers:
+        g = 0.3 * np.sin(x) * np.roll(x, -1, axis=0)
+        g[3] = -0.5 * v[3] - 0.2 * np.hypot(x[3, 0], x[3, 1])
+        return np.asarray(g)
+
+    def disturbances(t: float) -> Numbers:
+        i = np.arange(1, 5)[:, np.newaxis]
+        return np.sin((0.6 + 0.3 * i) * t) + 0.5 * np.cos(np.array([1, 2]) * t)
+
+    return Functions(costs, dynamics, disturbances)
+
+
+def two_hundred_households() -> Functions:
+    """Wishes and weights are numbers that were drawn: those of the file."""
+    given = tomllib.loads((GAMES / "two_hundred_households.toml").read_text(encoding="utf-8"))["parameters"]
+    h, w = np.array(given["h"]["value"]), np.array(given["w"]["value"])
+    i = np.arange(1, 201)[:, np.newaxis]
+
+    def costs(x: Numbers) -> Numbers:
+        load = own(x)[..., 0]
+        return np.asarray(w * (load - h) ** 2 + 0.5 * np.exp(x[..., 0].mean(axis=-1) / 2.0) * load)
+
+    def dynamics(x: Numbers, v: Numbers) -> Numbers:
+        del v
+        return np.asarray(0.1 * np.sin(np.roll(x, -1, axis=0)))
+
+    def disturbances(t: float) -> Numbers:
+        return np.asarray(2.0 * np.sin((0.5 + 0.01 * i) * t + i))
+
+    return Functions(costs, dynamics, disturbances)
+
+
+BY_HAND: dict[str, Callable[[], Functions]] = {
+    game.__name__: game
+    for game in (
+        cournot_isoelastic,
+        electric_vehicles,
+        power_control,
+        rate_allocation,
+        energy_peak_price,
+        source_seeking,
+        rivalling_pairs,
+        two_hundred_households,
+    )
+}
