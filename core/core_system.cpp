@@ -6,62 +6,9 @@
 #include <cmath>
 #include <set>
 
-#include "aligned_vector.hpp"
-#include "kernels/kernels.hpp"
-
 namespace mixed_order_game {
 
-namespace {
-
-class DenseCore final : public CoreSystem {
- public:
-  explicit DenseCore(int unknowns) : unknowns_(unknowns), matrix_(at(unknowns) * at(unknowns)), pivot_(at(unknowns)) {}
-
-  void clear() override {
-    std::fill(matrix_.begin(), matrix_.end(), 0.0);
-    begin_sequence();
-  }
-  bool factor() override { return kernels().lu_factor(unknowns_, matrix_.data(), pivot_.data()); }
-  [[nodiscard]] int place(int unknown) const override { return unknown; }
-  void solve(Real* b) override { kernels().lu_solve(unknowns_, matrix_.data(), pivot_.data(), b); }
-
- private:
-  Real* entry(int row, int column) override { return &matrix_[at(column * unknowns_ + row)]; }
-
-  int unknowns_;
-  AlignedVector matrix_;
-  std::vector<int> pivot_;
-};
-
-// LU without pivoting, in a minimum-degree order found once. The matrix is the identity for a step of zero length, so a
-// pivot that is too small for comfort means that the step is too long: factor() then says so and the step is shortened.
-class SparseCore final : public CoreSystem {
- public:
-  explicit SparseCore(const std::vector<std::vector<int>>& rows);
-
-  void clear() override {
-    std::fill(value_.begin(), value_.end(), 0.0);
-    begin_sequence();
-  }
-  bool factor() override;
-  [[nodiscard]] int place(int unknown) const override { return position_[at(unknown)]; }
-  void solve(Real* b) override;
-
- private:
-  Real* entry(int row, int column) override;
-
-  int unknowns_;
-  std::vector<int> position_;  // of an unknown in the order of elimination
-  // the rows of L (unit diagonal) and U together, in the order of elimination, columns ascending
-  std::vector<int> start_;
-  std::vector<int> diagonal_;  // number of each row's diagonal entry
-  std::vector<int> column_;
-  AlignedVector value_;
-  AlignedVector inverse_pivot_;
-  AlignedVector row_;
-};
-
-SparseCore::SparseCore(const std::vector<std::vector<int>>& rows)
+CoreSystem::CoreSystem(const std::vector<std::vector<int>>& rows)
     : unknowns_(static_cast<int>(rows.size())), position_(rows.size()), inverse_pivot_(rows.size()), row_(rows.size()) {
   std::vector<Eigen::Triplet<Real, int>> entries;
   for (int row = 0; row < unknowns_; ++row) {
@@ -97,14 +44,19 @@ SparseCore::SparseCore(const std::vector<std::vector<int>>& rows)
   value_.resize(column_.size());
 }
 
-Real* SparseCore::entry(int row, int column) {
+void CoreSystem::clear() {
+  std::fill(value_.begin(), value_.end(), 0.0);
+  next_ = 0;
+}
+
+Real* CoreSystem::entry(int row, int column) {
   const int i = position_[at(row)];
   const auto first = column_.begin() + start_[at(i)];
   const auto last = column_.begin() + start_[at(i + 1)];
   return &value_[at(std::lower_bound(first, last, position_[at(column)]) - column_.begin())];
 }
 
-bool SparseCore::factor() {
+bool CoreSystem::factor() {
   constexpr Real smallest_pivot = 1e-6;  // relative to the largest entry of its row
   for (int i = 0; i < unknowns_; ++i) {
     const int first = start_[at(i)];
@@ -128,7 +80,7 @@ bool SparseCore::factor() {
   return true;
 }
 
-void SparseCore::solve(Real* b) {
+void CoreSystem::solve(Real* b) const {
   for (int i = 0; i < unknowns_; ++i) {
     Real sum = b[i];
     for (int e = start_[at(i)]; e < diagonal_[at(i)]; ++e) sum -= value_[at(e)] * b[column_[at(e)]];
@@ -139,14 +91,6 @@ void SparseCore::solve(Real* b) {
     for (int e = diagonal_[at(i)] + 1; e < start_[at(i + 1)]; ++e) sum -= value_[at(e)] * b[column_[at(e)]];
     b[i] = sum * inverse_pivot_[at(i)];
   }
-}
-
-}  // namespace
-
-std::unique_ptr<CoreSystem> make_dense_core(int unknowns) { return std::make_unique<DenseCore>(unknowns); }
-
-std::unique_ptr<CoreSystem> make_sparse_core(const std::vector<std::vector<int>>& rows) {
-  return std::make_unique<SparseCore>(rows);
 }
 
 }  // namespace mixed_order_game

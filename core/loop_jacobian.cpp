@@ -5,8 +5,7 @@
 namespace mixed_order_game {
 
 LoopJacobian::LoopJacobian(const ClosedLoop& loop)
-    : estimates(at(loop.shape().players) * at(loop.shape().actions())),
-      weights(at(loop.shape().neurons) * at(loop.shape().actions())),
+    : weights(at(loop.shape().neurons) * at(loop.shape().actions())),
       activation(weights.size()),
       error(at(loop.shape().actions())),
       network(error.size()),
@@ -27,8 +26,7 @@ void LoopJacobian::linearize(const Real* state, const Signals& signals, const Mo
   const Parameters& parameters = loop_->parameters();
   const StateLayout& layout = loop_->layout();
   const int n = loop_->shape().actions();
-  std::copy_n(state + layout.estimates(), estimates.size(), estimates.begin());
-  parameters.cost->hessian_rows(estimates.data(), n, hessian.data());
+  parameters.cost->hessian_rows(state + layout.estimates(), n, hessian.data());
   if (parameters.strategy.perturbed) {
     parameters.dynamics->jacobian(state + layout.x(), state + layout.reference(), dynamics.data());
     parameters.dynamics->velocity_jacobian(state + layout.x(), state + layout.reference(), dynamics_by_velocity.data());

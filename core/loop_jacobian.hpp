@@ -1,4 +1,5 @@
-// The Jacobian of the closed loop with respect to its state, kept as the few numbers that it is made of.
+// The Jacobian of the closed loop with respect to its state, but for the derivatives of the activations, kept as the
+// few numbers that it is made of.
 #pragma once
 
 #include "closed_loop.hpp"
@@ -18,7 +19,6 @@ class LoopJacobian {
   [[nodiscard]] const ClosedLoop& loop() const { return *loop_; }
 
   /// The numbers it is made of, indexed by entry(i, l) unless said otherwise.
-  AlignedVector estimates;             ///< y
   AlignedVector weights;               ///< W
   AlignedVector activation;            ///< S
   AlignedVector error;                 ///< e

@@ -22,11 +22,7 @@ class NewtonSolver {
   virtual void solve(Real* b) = 0;
 };
 
-/// Elimination along the structure of the closed loop; see structured_newton.cpp. With coupled = false the derivatives
-/// of the activations with respect to the estimates are left out of the matrix, which makes what remains sparse.
-std::unique_ptr<NewtonSolver> make_structured_newton(bool coupled = true);
-
-/// The one that is expected to be fastest for a game of this shape.
-std::unique_ptr<NewtonSolver> make_newton_solver(const Shape& shape);
+/// Elimination along the structure of the closed loop; see structured_newton.cpp.
+std::unique_ptr<NewtonSolver> make_structured_newton();
 
 }  // namespace mixed_order_game

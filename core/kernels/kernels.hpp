@@ -84,22 +84,11 @@ struct Kernels {
   void (*factor_modes)(BlockModes modes, double gamma_k3, double* inverse, double* gain);
   /// Solves all blocks, in place: N rows of n.
   void (*solve_modes)(BlockModes modes, const double* inverse, double* rhs);
-  /// Column-major LU with partial pivoting, in place; false when a pivot is zero or not finite.
-  bool (*lu_factor)(int n, double* matrix, int* pivot);
-  void (*lu_solve)(int n, const double* matrix, const int* pivot, double* rhs);
-  /// Sums over m of S^2, c S^2 and c w S for each column; for centres that are numbers c.
-  void (*network_moments)(int n, int neurons, const double* centers, const double* activation, const double* weights,
-                          double* squares, double* centered_squares, double* centered_products);
-  /// S_change = S (-2 / rho^2) (along - c_m across), row by row; along and across per column.
-  void (*activation_changes)(int n, int neurons, const double* centers, double factor, const double* activation,
-                             const double* along, const double* across, double* change);
   /// dy_ij = dy_ij + gain_ij dxbar_j
   void (*add_shared_signal)(int players, int dimension, const double* gain, const double* shared, double* y);
-  /// rhs = scale rhs + from_error S + onto_weight W + from_activation S_change; coefficients per column. The change of
-  /// the activations may be null.
+  /// rhs = scale rhs + from_error S + onto_weight W, row by row; coefficients per column.
   void (*weight_corrections)(int n, int neurons, const double* scale, const double* from_error,
-                             const double* from_activation, const double* onto_weight, const double* activation,
-                             const double* activation_change, const double* weights, double* rhs);
+                             const double* onto_weight, const double* activation, const double* weights, double* rhs);
 
   // vectors
   void (*linear_sum)(std::int64_t n, double a, const double* x, double b, const double* y, double* z);

@@ -27,7 +27,6 @@ namespace {
 #include "full_columns.ipp"
 #include "estimate_blocks.ipp"
 #include "estimate_modes.ipp"
-#include "dense_lu.ipp"
 #include "vector_operations.ipp"
 #include "nordsieck.ipp"
 #include "tape.ipp"
@@ -51,10 +50,6 @@ const Kernels MIXED_ORDER_GAME_JOIN(kernels_, MIXED_ORDER_GAME_LEVEL) = {
     solve_blocks,
     factor_modes,
     solve_modes,
-    lu_factor,
-    lu_solve,
-    network_moments,
-    activation_changes,
     add_shared_signal,
     weight_corrections,
     linear_sum,

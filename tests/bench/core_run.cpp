@@ -34,22 +34,20 @@ double peak_megabytes() {
   throw std::runtime_error("/proc/self/status has no VmHWM");
 }
 
-std::unique_ptr<NewtonSolver> make_solver(const std::string& name, const Shape& shape) {
-  if (name == "auto") return make_newton_solver(shape);
-  if (name == "structured") return make_structured_newton(true);
-  if (name == "structured-uncoupled") return make_structured_newton(false);
+std::unique_ptr<NewtonSolver> make_solver(const std::string& name) {
+  if (name == "structured") return make_structured_newton();
   if (name == "klu") return make_klu_newton(false);
   if (name == "klu-ordered") return make_klu_newton(true);
   throw std::runtime_error("unknown linear solver " + name);
 }
 
 constexpr const char* usage =
-    "usage: core_run GAME --stop S --outputs N --rtol R [--repetitions 1] [--solver auto] [--write FILE]\n"
-    "  solver: auto, structured, structured-uncoupled, klu, klu-ordered\n"
+    "usage: core_run GAME --stop S --outputs N --rtol R [--repetitions 1] [--solver structured] [--write FILE]\n"
+    "  solver: structured, klu, klu-ordered\n"
     "  FILE receives x and z or v at times 0, S/N, ..., S as doubles, coordinate-major within a row\n";
 
 int run(int count, char** arguments) {
-  std::map<std::string, std::string> options{{"--repetitions", "1"}, {"--solver", "auto"}, {"--write", ""}};
+  std::map<std::string, std::string> options{{"--repetitions", "1"}, {"--solver", "structured"}, {"--write", ""}};
   for (int k = 2; k + 1 < count; k += 2) options[arguments[k]] = arguments[k + 1];
   if (count < 2 || count % 2 != 0 || !options.contains("--stop") || !options.contains("--outputs") ||
       !options.contains("--rtol")) {
@@ -66,7 +64,7 @@ int run(int count, char** arguments) {
   const std::string text{std::istreambuf_iterator<char>(file), {}};
   const ClosedLoop loop(parse_game(text).parameters);
   const ExternalDisturbance input(loop.shape().actions());
-  Integrator integrator(loop, input, make_solver(options["--solver"], loop.shape()));
+  Integrator integrator(loop, input, make_solver(options["--solver"]));
 
   const auto kept = at(2 * loop.shape().actions());  // x and z or v
   std::vector<double> trajectory(kept * at(outputs + 1));

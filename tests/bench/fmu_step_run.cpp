@@ -122,7 +122,7 @@ int run(char** arguments) {
       terminate(fmu);
       free_instance(fmu);
 
-      Integrator fresh(loop, input, make_newton_solver(shape));  // as an instance has its own
+      Integrator fresh(loop, input, make_structured_newton());  // as an instance has its own
       fresh.start(0.0, {rtol, 0.01 * rtol});
       begun = cpu_seconds();
       for (int k = 0; k < steps; ++k) {

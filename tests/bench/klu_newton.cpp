@@ -22,19 +22,16 @@ void for_each_term(const LoopJacobian& jacobian, Term term) {
   const Shape& shape = loop.shape();
   const StateLayout& layout = loop.layout();
   const Gains& gains = parameters.gains;
-  const RbfNetwork& rbf = parameters.rbf;
   const SparseRows& hessian_rows = parameters.cost->hessian_pattern();
   const SparseRows& dynamics_rows = parameters.dynamics->jacobian_pattern();
   const NeighbourRows graph = parameters.graph.neighbours();
   const int n = shape.actions();
   const int q = shape.neurons;
-  const Real factor = -2.0 / (rbf.width * rbf.width);
 
   for (int p = 0; p < n; ++p) {
     const int i = shape.player_of(p);
     const bool second = shape.is_second_order(i);
     const int own = layout.estimates_of(i);
-    const Real* y = jacobian.estimates.data() + i * n;
     const auto error = [&](int row, Real scale) {  // scale * de
       if (!second) {
         term(row, layout.x() + p, scale);
@@ -60,27 +57,7 @@ void for_each_term(const LoopJacobian& jacobian, Term term) {
     }
     if (!parameters.strategy.robust) continue;
 
-    // d(w'S) = S'dw + sum_m w_m dS_m with dS_m = factor S_m (y - c_m).dy
-    Real products = 0.0;
-    Real centered_products = 0.0;
-    for (int m = 0; m < q; ++m) {
-      const Real product = jacobian.weights[at(m * n + p)] * jacobian.activation[at(m * n + p)];
-      term(driven, layout.weights_of(m) + p, -jacobian.activation[at(m * n + p)]);
-      products += product;
-      if (rbf.diagonal) centered_products += rbf.centers[at(m)] * product;
-    }
-    const auto network_slope = [&](int k) {  // d(w'S) / dy_i[k]
-      Real centered = centered_products;
-      if (!rbf.diagonal) {
-        centered = 0.0;
-        for (int m = 0; m < q; ++m) {
-          centered += rbf.centers[at(m * n + k)] * jacobian.weights[at(m * n + p)] * jacobian.activation[at(m * n + p)];
-        }
-      }
-      return factor * (products * y[k] - centered);
-    };
-    for (int k = 0; k < n; ++k) term(driven, own + k, -network_slope(k));
-
+    for (int m = 0; m < q; ++m) term(driven, layout.weights_of(m) + p, -jacobian.activation[at(m * n + p)]);
     const Real theta = jacobian.inverse_bound[at(p)];
     const Real r = jacobian.network[at(p)] * theta;
     const Real push = gains.beta * jacobian.error[at(p)];
@@ -89,15 +66,8 @@ void for_each_term(const LoopJacobian& jacobian, Term term) {
       const Real w = jacobian.weights[at(m * n + p)];
       const Real S = jacobian.activation[at(m * n + p)];
       error(row, gains.beta * (S - r * w));
-      const Real* center = rbf.centers.data() + (rbf.diagonal ? m : m * n);
-      const int stride = rbf.diagonal ? 0 : 1;
-      const bool on_sphere = theta != 0.0;
-      const Real onto_weight = push * w * theta;
-      for (int k = 0; k < n; ++k) {
-        const Real slope = push * factor * S * (y[k] - center[k * stride]);
-        term(row, own + k, on_sphere ? slope - onto_weight * network_slope(k) : slope);
-      }
-      if (on_sphere) {
+      if (theta != 0.0) {
+        const Real onto_weight = push * w * theta;
         for (int h = 0; h < q; ++h) {
           term(row, layout.weights_of(h) + p, -onto_weight * jacobian.activation[at(h * n + p)]);
         }

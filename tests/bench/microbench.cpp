@@ -37,8 +37,8 @@ struct Scene {
         rate(state.size()),
         d_ext(at(loop.shape().actions()), 0.0),
         jacobian(loop),
-        solver(make_newton_solver(loop.shape())) {
-    Integrator integrator(loop, input, make_newton_solver(loop.shape()));
+        solver(make_structured_newton()) {
+    Integrator integrator(loop, input, make_structured_newton());
     integrator.start(0.0, {1e-4, 1e-6});
     integrator.advance(time);
     std::copy_n(integrator.state(), state.size(), state.begin());

@@ -31,7 +31,7 @@ struct Simulation {
   explicit Simulation(const std::string& toml, std::unique_ptr<NewtonSolver> solver = nullptr)
       : loop(parse_game(toml).parameters),
         input(loop.shape().actions()),
-        integrator(loop, input, solver ? std::move(solver) : make_newton_solver(loop.shape())) {}
+        integrator(loop, input, solver ? std::move(solver) : make_structured_newton()) {}
 
   [[nodiscard]] std::vector<Real> state() const {
     return {integrator.state(), integrator.state() + loop.layout().size()};
@@ -143,10 +143,9 @@ TEST(Integrator, ContinuesFromTheStoredStateWhenTheStepsLeadElsewhere) {
 
 TEST(Integrator, StructuredAndDenseSolversGiveTheSameRun) {
   for (const std::string& game : {paper_game, busy_game}) {
-    Simulation structured(text_of(game), make_structured_newton(true));
-    Simulation uncoupled(text_of(game), make_structured_newton(false));
-    Simulation dense(text_of(game), make_dense_newton(true));
-    for (Simulation* run : {&structured, &uncoupled, &dense}) {
+    Simulation structured(text_of(game));
+    Simulation dense(text_of(game), make_dense_newton());
+    for (Simulation* run : {&structured, &dense}) {
       run->integrator.start(0.0, {1e-9, 1e-11});
       run->integrator.advance(2.0);
       for (int p = 0; p < run->loop.shape().actions(); ++p) {
@@ -263,7 +262,7 @@ TEST(Integrator, SlidesWithARobustTermAsSteepAsTheTheoremsAskFor) {
   const std::vector<Real> x_star = nash_equilibrium(*loop.parameters().cost, loop.shape());
   const ExternalDisturbance input(loop.shape().actions());
   for (const Real tolerance : {1e-4, 1e-5, 3e-6, 1e-6, 3e-7, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11}) {
-    Integrator integrator(loop, input, make_newton_solver(loop.shape()));
+    Integrator integrator(loop, input, make_structured_newton());
     integrator.start(0.0, {tolerance, 0.01 * tolerance});
     integrator.advance(end);
     const Real allowed = 1e-3 + 100.0 * tolerance;  // k2 / k3 and the time to reach the layer count too

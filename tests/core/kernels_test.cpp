@@ -387,8 +387,8 @@ TEST(Columns, FollowTheirFormulas) {
   RandomNumbers random(9);
   for (const int n : sizes) {
     constexpr int rows = 6;
-    const Array S(rows * n, random), w(rows * n, random), change(rows * n, random), centers(rows, random);
-    const Array e(n, random), r(n, random), scale(n, random), from_activation(n, random), onto_weight(n, random);
+    const Array S(rows * n, random), w(rows * n, random);
+    const Array e(n, random), r(n, random), scale(n, random), onto_weight(n, random);
 
     const Array products = on_every_level([&](const Kernels& kernel) {
       Array sum(n, 9.0);
@@ -402,42 +402,18 @@ TEST(Columns, FollowTheirFormulas) {
     });
     const Array corrected = on_every_level([&](const Kernels& kernel) {
       Array rhs(S);
-      kernel.weight_corrections(n, rows, scale, e, from_activation, onto_weight, S, change, w, rhs);
+      kernel.weight_corrections(n, rows, scale, e, onto_weight, S, w, rhs);
       return rhs;
-    });
-    const Array uncoupled = on_every_level([&](const Kernels& kernel) {
-      Array rhs(S);
-      kernel.weight_corrections(n, rows, scale, e, nullptr, onto_weight, S, nullptr, w, rhs);
-      return rhs;
-    });
-    const Array moments = on_every_level([&](const Kernels& kernel) {
-      Array sums(3 * n, 9.0);
-      kernel.network_moments(n, rows, centers, S, w, sums, sums + n, sums + 2 * n);
-      return sums;
-    });
-    const Array changes = on_every_level([&](const Kernels& kernel) {
-      Array out(rows * n);
-      kernel.activation_changes(n, rows, centers, -0.5, S, e, r, out);
-      return out;
     });
     for (int p = 0; p < n; ++p) {
-      double product = 0.0, squares = 0.0, centered_squares = 0.0, centered_products = 0.0;
+      double product = 0.0;
       for (int m = 0; m < rows; ++m) {
         const int k = m * n + p;
         product += w[k] * S[k];
-        squares += S[k] * S[k];
-        centered_squares += centers[m] * S[k] * S[k];
-        centered_products += centers[m] * w[k] * S[k];
         EXPECT_NEAR(rates[k], 30.0 * e[p] * (S[k] - r[p] * w[k]), 1e-12);
-        EXPECT_NEAR(corrected[k],
-                    scale[p] * S[k] + e[p] * S[k] + from_activation[p] * change[k] + onto_weight[p] * w[k], 1e-14);
-        EXPECT_NEAR(uncoupled[k], scale[p] * S[k] + e[p] * S[k] + onto_weight[p] * w[k], 1e-14);
-        EXPECT_NEAR(changes[k], S[k] * -0.5 * (e[p] - centers[m] * r[p]), 1e-14);
+        EXPECT_NEAR(corrected[k], scale[p] * S[k] + e[p] * S[k] + onto_weight[p] * w[k], 1e-14);
       }
       EXPECT_NEAR(products[p], product, 1e-14);
-      EXPECT_NEAR(moments[p], squares, 1e-14);
-      EXPECT_NEAR(moments[n + p], centered_squares, 1e-14);
-      EXPECT_NEAR(moments[2 * n + p], centered_products, 1e-14);
     }
   }
 }
@@ -578,45 +554,6 @@ TEST(Blocks, AreSolvedByTheirModes) {
         EXPECT_NEAR(solution[i * n + p], sum_of_modes(i, p, along), 1e-13) << N;
       }
     }
-  }
-}
-
-TEST(DenseLu, SolvesWithPivoting) {
-  RandomNumbers random(12);
-  for (const int n : {1, 2, 3, 7, 8, 9, 17, 40}) {
-    Array matrix(n * n, random);
-    for (int k = 0; k + 1 < n; ++k) matrix[k * n + k] = 0.0;  // no pivot on the diagonal
-    const Array rhs(n, random);
-    const Array solution = on_every_level([&](const Kernels& kernel) {
-      Array lu(matrix);
-      Array x(rhs);
-      std::vector<int> pivot(static_cast<std::size_t>(n));
-      EXPECT_TRUE(kernel.lu_factor(n, lu, pivot.data()));
-      kernel.lu_solve(n, lu, pivot.data(), x);
-      return x;
-    });
-    for (int i = 0; i < n; ++i) {
-      double sum = 0.0;
-      double size = 0.0;
-      for (int j = 0; j < n; ++j) {
-        sum += matrix[j * n + i] * solution[j];
-        size += std::abs(matrix[j * n + i] * solution[j]);
-      }
-      EXPECT_NEAR(sum, rhs[i], 1e-13 * (size + 1.0)) << n;
-    }
-  }
-}
-
-TEST(DenseLu, TellsASingularMatrix) {
-  for (int level = 0; level < kernel_level_count(); ++level) {
-    const Kernels& kernel = kernels_of_level(level);
-    int pivot[2];
-    double dependent[] = {1.0, 2.0, 2.0, 4.0};
-    EXPECT_FALSE(kernel.lu_factor(2, dependent, pivot));
-    double zero[] = {0.0, 1.0, 0.0, 1.0};
-    EXPECT_FALSE(kernel.lu_factor(2, zero, pivot));
-    double undefined[] = {not_a_number, 1.0, 1.0, 1.0};
-    EXPECT_FALSE(kernel.lu_factor(2, undefined, pivot));
   }
 }
 

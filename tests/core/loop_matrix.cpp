@@ -5,17 +5,15 @@
 
 namespace mixed_order_game {
 
-std::vector<MatrixEntry> matrix_of(const LoopJacobian& jacobian, bool coupled) {
+std::vector<MatrixEntry> matrix_of(const LoopJacobian& jacobian) {
   const Parameters& parameters = jacobian.loop().parameters();
   const Shape& shape = jacobian.loop().shape();
   const StateLayout& layout = jacobian.loop().layout();
   const Gains& gains = parameters.gains;
-  const RbfNetwork& rbf = parameters.rbf;
   const int n = shape.actions();
   const SparseRows& hessian_rows = parameters.cost->hessian_pattern();
   const SparseRows& dynamics_rows = parameters.dynamics->jacobian_pattern();
   const bool robust = parameters.strategy.robust;
-  const Real factor = -2.0 / (rbf.width * rbf.width);
 
   std::vector<MatrixEntry> entries;
   std::vector<Real> row(at(layout.size()), 0.0);  // one row, gathered before it is written
@@ -34,11 +32,6 @@ std::vector<MatrixEntry> matrix_of(const LoopJacobian& jacobian, bool coupled) {
     }
     touched.clear();
   };
-  const auto dS_dy = [&](int m, int p, int k) {  // d S_m(y_i) / d y_i[k]
-    const int i = shape.player_of(p);
-    const Real c = rbf.diagonal ? rbf.centers[at(m)] : rbf.centers[at(m * n + k)];
-    return jacobian.activation[at(m * n + p)] * factor * (jacobian.estimates[at(i * n + k)] - c);
-  };
   const auto add_error = [&](int p, Real scale) {  // scale * de
     const int i = shape.player_of(p);
     if (shape.is_second_order(i)) {
@@ -52,14 +45,7 @@ std::vector<MatrixEntry> matrix_of(const LoopJacobian& jacobian, bool coupled) {
     }
   };
   const auto add_network = [&](int p, Real scale) {  // scale * d(w'S)
-    const int i = shape.player_of(p);
-    for (int m = 0; m < shape.neurons; ++m) {
-      add(layout.weights_of(m) + p, scale * jacobian.activation[at(m * n + p)]);
-      if (!coupled) continue;
-      for (int k = 0; k < n; ++k) {
-        add(layout.estimates_of(i) + k, scale * jacobian.weights[at(m * n + p)] * dS_dy(m, p, k));
-      }
-    }
+    for (int m = 0; m < shape.neurons; ++m) add(layout.weights_of(m) + p, scale * jacobian.activation[at(m * n + p)]);
   };
   const auto add_driven = [&](int p) {  // d(u + g)
     add_error(p, -((shape.is_second_order(shape.player_of(p)) ? gains.k4 : gains.k1) + jacobian.slope[at(p)]));
@@ -112,9 +98,6 @@ std::vector<MatrixEntry> matrix_of(const LoopJacobian& jacobian, bool coupled) {
       const Real e = jacobian.error[at(p)];
       const Real r = jacobian.network[at(p)] * jacobian.inverse_bound[at(p)];
       add_error(p, gains.beta * (jacobian.activation[at(m * n + p)] - r * w));
-      for (int k = 0; coupled && k < n; ++k) {
-        add(layout.estimates_of(shape.player_of(p)) + k, gains.beta * e * dS_dy(m, p, k));
-      }
       if (jacobian.inverse_bound[at(p)] != 0.0) {
         add_network(p, -gains.beta * e * w * jacobian.inverse_bound[at(p)]);
         add(layout.weights_of(m) + p, -gains.beta * e * r);
@@ -125,24 +108,16 @@ std::vector<MatrixEntry> matrix_of(const LoopJacobian& jacobian, bool coupled) {
   return entries;
 }
 
-std::vector<Real> product_of(const LoopJacobian& jacobian, const std::vector<Real>& vector) {
-  std::vector<Real> product(vector.size());
-  for (const auto& [row, column, value] : matrix_of(jacobian, true)) product[at(row)] += value * vector[at(column)];
-  return product;
-}
-
 namespace {
 
 class DenseNewton final : public NewtonSolver {
  public:
-  explicit DenseNewton(bool coupled) : coupled_(coupled) {}
-
   void refresh(const LoopJacobian& /*jacobian*/) override {}
 
   bool factor(const LoopJacobian& jacobian, Real gamma) override {
     const int size = jacobian.loop().layout().size();
     Eigen::MatrixXd matrix = Eigen::MatrixXd::Identity(size, size);
-    for (const auto& [row, column, value] : matrix_of(jacobian, coupled_)) matrix(row, column) -= gamma * value;
+    for (const auto& [row, column, value] : matrix_of(jacobian)) matrix(row, column) -= gamma * value;
     lu_.compute(matrix);
     return lu_.matrixLU().diagonal().cwiseAbs().minCoeff() > 0.0;
   }
@@ -153,12 +128,11 @@ class DenseNewton final : public NewtonSolver {
   }
 
  private:
-  bool coupled_;
   Eigen::PartialPivLU<Eigen::MatrixXd> lu_;
 };
 
 }  // namespace
 
-std::unique_ptr<NewtonSolver> make_dense_newton(bool coupled) { return std::make_unique<DenseNewton>(coupled); }
+std::unique_ptr<NewtonSolver> make_dense_newton() { return std::make_unique<DenseNewton>(); }
 
 }  // namespace mixed_order_game

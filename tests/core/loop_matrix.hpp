@@ -16,14 +16,10 @@ struct MatrixEntry {
   Real value;
 };
 
-/// All entries that may differ from zero, each position once. With coupled = false the derivatives of the activations
-/// with respect to the estimates are left out.
-std::vector<MatrixEntry> matrix_of(const LoopJacobian& jacobian, bool coupled);
-
-/// product = J vector, both of the state's length.
-std::vector<Real> product_of(const LoopJacobian& jacobian, const std::vector<Real>& vector);
+/// All entries that may differ from zero, each position once.
+std::vector<MatrixEntry> matrix_of(const LoopJacobian& jacobian);
 
 /// Dense LU of the whole matrix, by Eigen.
-std::unique_ptr<NewtonSolver> make_dense_newton(bool coupled = true);
+std::unique_ptr<NewtonSolver> make_dense_newton();
 
 }  // namespace mixed_order_game

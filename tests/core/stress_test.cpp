@@ -24,8 +24,6 @@ std::uint64_t games(std::uint64_t usual) {
 /// Ends a run that would go on for ever.
 class BoundedSolver final : public NewtonSolver {
  public:
-  explicit BoundedSolver(const Shape& shape) : solver_(make_newton_solver(shape)) {}
-
   void refresh(const LoopJacobian& jacobian) override { solver_->refresh(jacobian); }
   bool factor(const LoopJacobian& jacobian, Real gamma) override { return solver_->factor(jacobian, gamma); }
   void solve(Real* b) override {
@@ -34,7 +32,7 @@ class BoundedSolver final : public NewtonSolver {
   }
 
  private:
-  std::unique_ptr<NewtonSolver> solver_;
+  std::unique_ptr<NewtonSolver> solver_ = make_structured_newton();
   std::int64_t solves_ = 0;
 };
 
@@ -104,7 +102,7 @@ struct Outcome {
 Outcome run(const PlainGame& game, Real tolerance, Real end) {
   const ClosedLoop loop(parse_game(testing::toml_of(game)).parameters);
   const ExternalDisturbance input(loop.shape().actions());
-  Integrator integrator(loop, input, std::make_unique<BoundedSolver>(loop.shape()));
+  Integrator integrator(loop, input, std::make_unique<BoundedSolver>());
   std::vector<Real> norm2(at(loop.shape().actions()));
   Outcome outcome;
   try {
