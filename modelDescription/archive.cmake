@@ -1,7 +1,7 @@
 # The FMU of the paper's example, made anew whenever the library, the description or any packed file changes, and the
 # files from which an installed package makes FMUs of other games.
 
-set(packaging ${PROJECT_SOURCE_DIR}/python_harness/mixed_order_game/packaging.py)
+set(packaging ${PROJECT_SOURCE_DIR}/python_harness/mixed_order_game/fmu/packaging.py)
 set(game ${PROJECT_SOURCE_DIR}/modelDescription/games/five_vehicles.toml)
 set(documentation ${PROJECT_SOURCE_DIR}/modelDescription/documentation)
 set(icon ${PROJECT_SOURCE_DIR}/modelDescription/model.png)

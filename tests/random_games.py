@@ -11,11 +11,16 @@ from typing import Any
 
 import numpy as np
 
-from mixed_order_game.analysis.game import game_from_tables
-from mixed_order_game.authoring.gains import choose_gains
 from mixed_order_game.errors import GameError
-from mixed_order_game.parameters import GameParameters
-from mixed_order_game.spectrum import linear_loop, monotonicity_constant, nash_equilibrium, spectral_abscissa
+from mixed_order_game.game.gains import choose_gains
+from mixed_order_game.game.parameters import GameParameters
+from mixed_order_game.theory.game import game_from_tables
+from mixed_order_game.theory.spectrum import (
+    linear_loop,
+    monotonicity_constant,
+    nash_equilibrium,
+    spectral_abscissa,
+)
 
 Tables = dict[str, Any]
 

@@ -24,7 +24,7 @@ from .targets import LIEF, TARGETS, ZIGLANG, PlatformError, Target
 
 ROOT = Path(__file__).resolve().parents[2]
 GAME = ROOT / "modelDescription" / "games" / "five_vehicles.toml"
-PACKAGING = ROOT / "python_harness" / "mixed_order_game" / "packaging.py"
+PACKAGING = ROOT / "python_harness" / "mixed_order_game" / "fmu" / "packaging.py"
 
 PLATFORMS = ("linux64", "win64", "darwin64", "aarch64-linux")
 ARCHIVE = "MixedOrderGame.fmu"

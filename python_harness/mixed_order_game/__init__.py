@@ -5,10 +5,9 @@
 >>> result.x.shape  # time, player, coordinate
 (1001, 5, 2)
 
-The figures are in mixed_order_game.plot, the command is mog.
+The figures are in mixed_order_game.results.plot, the command is mog.
 """
 
-from .build import build_fmu, cached_fmu, default_fmu, default_game
 from .errors import (
     BuildError,
     GameError,
@@ -19,10 +18,11 @@ from .errors import (
     SimulationError,
     VariableError,
 )
-from .model import Model, Variable, read_model
-from .results import Result, load
-from .run import Simulator, run
-from .validate import Claim, Validation, Verdict, validate
+from .fmu.build import build_fmu, cached_fmu, default_fmu, default_game
+from .fmu.model import Model, Variable, read_model
+from .fmu.run import Simulator, run
+from .results.result import Result, load
+from .studies.validate import Claim, Validation, Verdict, validate
 from .version import package_version
 
 __version__ = package_version()

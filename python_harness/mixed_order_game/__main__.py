@@ -1,5 +1,5 @@
 """python -m mixed_order_game is the command mog."""
 
-from .cli import main
+from .cli.app import main
 
 main()

@@ -11,7 +11,7 @@ def main() -> None:
     """Entry point of the command."""
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
         signal.signal(signal.SIGINT, _leave)
-    from mixed_order_game.cli import main as command
+    from mixed_order_game.cli.app import main as command
 
     command()
 

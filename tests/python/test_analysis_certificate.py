@@ -7,26 +7,22 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mixed_order_game.analysis import (
+from mixed_order_game.theory import paper_bounds
+from mixed_order_game.theory.analyst import paper_thresholds
+from mixed_order_game.theory.certificate import (
+    Weights,
     best_certificate,
-    dynamics_constants,
-    exact_ceiling,
-    exact_loop,
-    exact_threshold,
-    loop_constants,
-    paper_bounds,
-    read_game,
+    proved_rate,
     sufficient_gains,
     theorem_2_rate,
     theorem_2_thresholds,
 )
-from mixed_order_game.analysis.analyst import paper_thresholds
-from mixed_order_game.analysis.certificate import Weights, proved_rate
-from mixed_order_game.analysis.constants import NO_DYNAMICS
-from mixed_order_game.analysis.design import paper_constants
-from mixed_order_game.analysis.game import AnalysedGame, Gains
-from mixed_order_game.analysis.paper_bounds import gains_above, gains_for_rate, thresholds
-from mixed_order_game.spectrum import linear_loop, spectral_abscissa
+from mixed_order_game.theory.constants import NO_DYNAMICS, dynamics_constants, loop_constants
+from mixed_order_game.theory.design import paper_constants
+from mixed_order_game.theory.exact_loop import exact_ceiling, exact_loop, exact_threshold
+from mixed_order_game.theory.game import AnalysedGame, Gains, read_game
+from mixed_order_game.theory.paper_bounds import gains_above, gains_for_rate, thresholds
+from mixed_order_game.theory.spectrum import linear_loop, spectral_abscissa
 from tests.conftest import GAMES
 from tests.oracle import game as oracle
 from tests.oracle import linear_loop as oracle_loop

@@ -6,17 +6,16 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from mixed_order_game.analysis import LoopConstants, dynamics_constants, loop_constants, read_game
-from mixed_order_game.analysis.constants import dynamics_bound
-from mixed_order_game.analysis.game import (
-    AnalysedGame,
-    game_from_tables,
-    toml_text,
-    without_square,
-)
-from mixed_order_game.analysis.graph import consensus_blocks, is_connected
-from mixed_order_game.analysis.lyapunov import identity_right_side, scaled_identity
 from mixed_order_game.errors import GameError
+from mixed_order_game.theory.constants import (
+    LoopConstants,
+    dynamics_bound,
+    dynamics_constants,
+    loop_constants,
+)
+from mixed_order_game.theory.game import AnalysedGame, game_from_tables, read_game, toml_text, without_square
+from mixed_order_game.theory.graph import consensus_blocks, is_connected
+from mixed_order_game.theory.lyapunov import identity_right_side, scaled_identity
 from tests.conftest import GAMES, FmuOf
 from tests.oracle import equilibrium, linear_loop
 from tests.oracle import game as oracle

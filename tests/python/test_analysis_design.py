@@ -9,35 +9,28 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import typer
 from numpy.typing import NDArray
 from rich.console import Console
 from typer.testing import CliRunner
 
 from mixed_order_game import build_fmu
-from mixed_order_game.analysis import (
-    AnalysedGame,
-    Design,
-    analyse,
-    command,
-    paper_design,
-    print_analysis,
-    read_game,
-    sharper_design,
-)
-from mixed_order_game.analysis.domain import initial_errors
-from mixed_order_game.analysis.game import game_from_tables, toml_text, without_square
-from mixed_order_game.analysis.hypotheses import design_hypotheses, largest_representable_radius, robust_term
-from mixed_order_game.analysis.network_fit import (
+from mixed_order_game.cli.analysis_tables import print_analysis
+from mixed_order_game.cli.app import app
+from mixed_order_game.errors import GameError, SimulationError, VariableError
+from mixed_order_game.theory.analysis import analyse
+from mixed_order_game.theory.design import Design, paper_design, sharper_design
+from mixed_order_game.theory.domain import initial_errors
+from mixed_order_game.theory.game import AnalysedGame, game_from_tables, read_game, toml_text, without_square
+from mixed_order_game.theory.hypotheses import design_hypotheses, largest_representable_radius, robust_term
+from mixed_order_game.theory.network_fit import (
     activations,
     ball_points,
     least_squares_fit,
     mirror_bound,
     trajectory_fit,
 )
-from mixed_order_game.analysis.simulation import simulate
-from mixed_order_game.errors import GameError, SimulationError, VariableError
-from mixed_order_game.spectrum import nash_equilibrium
+from mixed_order_game.theory.simulation import simulate
+from mixed_order_game.theory.spectrum import nash_equilibrium
 from tests.conftest import GAMES, FmuOf
 from tests.oracle import game as oracle
 from tests.oracle import paper_equations as paper
@@ -206,7 +199,7 @@ def test_robust_term_of_the_example_fails_beyond_a_radius(five: AnalysedGame) ->
     """delta = 10 is too small for any W* where |y_i - x*| > 1.054, for player 5: 5 + 5 sqrt(0.9) r > 10."""
     radius = largest_representable_radius(five)
     assert radius == pytest.approx(1.0 / math.sqrt(0.9), rel=1e-6)
-    from mixed_order_game.analysis.domain import Domain
+    from mixed_order_game.theory.domain import Domain
 
     assert robust_term(five, Domain(1.0, 1.0, 1.01 * radius)).holds is False
     assert robust_term(five, Domain(1.0, 1.0, 0.5)).holds is True
@@ -331,19 +324,7 @@ def test_analysis_refuses(fmu: Path, tmp_path: Path) -> None:
         analyse(flat, simulation=False)
 
 
-@pytest.fixture(scope="module")
-def app() -> typer.Typer:
-    made = typer.Typer()
-    command.register(made)
-
-    @made.callback()
-    def root() -> None:
-        """Make analyse a subcommand, as in mog."""
-
-    return made
-
-
-def test_commands_of_the_page(app: typer.Typer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_commands_of_the_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """What docs/analyse.md shows runs, and every test that it names exists."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     root = FIVE_VEHICLES.parents[2]
@@ -360,7 +341,7 @@ def test_commands_of_the_page(app: typer.Typer, tmp_path: Path, monkeypatch: pyt
         assert f"def {named}(" in sources, named
 
 
-def test_command(app: typer.Typer) -> None:
+def test_command() -> None:
     result = CliRunner().invoke(app, ["analyse", str(FIVE_VEHICLES), "--no-simulation", "--json"])
     assert result.exit_code == 0, result.output
     told = json.loads(result.output)

@@ -16,13 +16,17 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from mixed_order_game.analysis import loop_constants, read_game
-from mixed_order_game.analysis import paper_bounds as pb
-from mixed_order_game.analysis.certificate import Weights, comparison_matrix
-from mixed_order_game.analysis.constants import NO_DYNAMICS, DynamicsConstants, dynamics_constants
-from mixed_order_game.analysis.design import paper_constants
-from mixed_order_game.analysis.game import AnalysedGame, Gains
-from mixed_order_game.analysis.lyapunov import scaled_identity
+from mixed_order_game.theory import paper_bounds as pb
+from mixed_order_game.theory.certificate import Weights, comparison_matrix
+from mixed_order_game.theory.constants import (
+    NO_DYNAMICS,
+    DynamicsConstants,
+    dynamics_constants,
+    loop_constants,
+)
+from mixed_order_game.theory.design import paper_constants
+from mixed_order_game.theory.game import AnalysedGame, Gains, read_game
+from mixed_order_game.theory.lyapunov import scaled_identity
 from tests.conftest import GAMES
 from tests.oracle import closed_loop, equilibrium
 from tests.oracle import game as oracle

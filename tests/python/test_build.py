@@ -14,14 +14,14 @@ from mixed_order_game import (
     GameError,
     SimulationError,
     Simulator,
-    build,
     build_fmu,
     cached_fmu,
     default_fmu,
     default_game,
     read_model,
 )
-from mixed_order_game.temporary import folder_of_process
+from mixed_order_game.files.temporary import folder_of_process
+from mixed_order_game.fmu import build
 from tests.conftest import GAMES
 
 
@@ -147,7 +147,7 @@ def test_temporary_folders_that_are_of_no_use(
         raise error
 
     monkeypatch.setattr("fmpy.extract", refuse)
-    monkeypatch.setattr("mixed_order_game.temporary._runs_nothing", lambda _: True)
+    monkeypatch.setattr("mixed_order_game.files.temporary._runs_nothing", lambda _: True)
     with pytest.raises(SimulationError) as refused:
         Simulator(fmu)
     assert str(refused.value).startswith(f"{fmu} cannot be loaded: ")

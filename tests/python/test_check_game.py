@@ -10,12 +10,14 @@ from hypothesis import strategies as st
 from typer.testing import CliRunner, Result
 
 from mixed_order_game import GameError, default_game
-from mixed_order_game.analysis import analyse, read_game
-from mixed_order_game.authoring import Recipe, check_game, new_game
-from mixed_order_game.authoring.positions import Positions
-from mixed_order_game.build import build_fmu
-from mixed_order_game.cli import app
-from mixed_order_game.spectrum import nash_equilibrium
+from mixed_order_game.cli.app import app
+from mixed_order_game.fmu.build import build_fmu
+from mixed_order_game.game.check import check_game
+from mixed_order_game.game.new import Recipe, new_game
+from mixed_order_game.game.positions import Positions
+from mixed_order_game.theory.analysis import analyse
+from mixed_order_game.theory.game import read_game
+from mixed_order_game.theory.spectrum import nash_equilibrium
 
 MANY = """\
 title = "bad"

@@ -10,7 +10,7 @@ import pytest
 from typer.testing import CliRunner, Result
 
 from mixed_order_game import default_game, load, package_version
-from mixed_order_game.cli import app
+from mixed_order_game.cli.app import app
 
 COMMANDS = ["build", "info", "run", "validate", "plot", "demo"]
 

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from mixed_order_game import ResultError, VariableError, run
-from mixed_order_game.compare import (
+from mixed_order_game.results.metrics import METRIC_UNITS, metrics
+from mixed_order_game.studies.compare import (
     AS_IT_IS,
     CompareError,
     Comparison,
@@ -15,8 +16,7 @@ from mixed_order_game.compare import (
     compare_results,
     load_results,
 )
-from mixed_order_game.metrics import METRIC_UNITS, metrics
-from mixed_order_game.sweeping import Settings
+from mixed_order_game.studies.sampler import Settings
 
 
 @pytest.fixture(scope="module")

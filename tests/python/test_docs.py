@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from mixed_order_game.cli import app
+from mixed_order_game.cli.app import app
 
 DOCS = Path(__file__).resolve().parents[2] / "python_harness" / "docs"
 

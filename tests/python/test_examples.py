@@ -9,9 +9,10 @@ from numpy.typing import NDArray
 from scipy.optimize import root
 
 from mixed_order_game import Simulator, build_fmu, read_model
-from mixed_order_game.authoring import Recipe, check_game, new_game
-from mixed_order_game.parameters import game_parameters
-from mixed_order_game.spectrum import linear_loop, monotonicity_constant, spectral_abscissa
+from mixed_order_game.game.check import check_game
+from mixed_order_game.game.new import Recipe, new_game
+from mixed_order_game.game.parameters import game_parameters
+from mixed_order_game.theory.spectrum import linear_loop, monotonicity_constant, spectral_abscissa
 from tests.games_by_hand import BY_HAND
 from tests.oracle.equilibrium import nash_equilibrium, strong_monotonicity_constant
 from tests.oracle.game import read_game

@@ -12,7 +12,7 @@ import pytest
 from typer.testing import CliRunner
 
 from mixed_order_game import default_fmu, read_model
-from mixed_order_game.cli import app
+from mixed_order_game.cli.app import app
 from mixed_order_game.reporting.fmu_reference import fmu_reference, main
 
 ROOT = Path(__file__).resolve().parents[2]

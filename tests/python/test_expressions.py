@@ -14,8 +14,8 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import root
 
 import mixed_order_game as mog
-from mixed_order_game.build import build_fmu
 from mixed_order_game.errors import GameError
+from mixed_order_game.fmu.build import build_fmu
 
 K = 0.2784645427610738
 GAME = """

@@ -9,17 +9,19 @@ import pytest
 from typer.testing import CliRunner, Result
 
 import mixed_order_game as mog
-from mixed_order_game.analysis import analyse, dynamics_constants, loop_constants, read_game
-from mixed_order_game.authoring.gains import choose_gains
-from mixed_order_game.build import build_fmu
-from mixed_order_game.claims.unperturbed_loop import slowest_rate_seen
-from mixed_order_game.claims.verdict import Verdict
-from mixed_order_game.cli import app
-from mixed_order_game.parameters import GameParameters, game_parameters
-from mixed_order_game.spectrum import linear_loop, monotonicity_constant, nash_equilibrium
-from mixed_order_game.tune import tune
-from mixed_order_game.unknown_term import recorded_for_unknown_term, unknown_term
-from mixed_order_game.validate import validate
+from mixed_order_game.cli.app import app
+from mixed_order_game.fmu.build import build_fmu
+from mixed_order_game.game.gains import choose_gains
+from mixed_order_game.game.parameters import GameParameters, game_parameters
+from mixed_order_game.results.unknown_term import recorded_for_unknown_term, unknown_term
+from mixed_order_game.studies.claims.unperturbed_loop import slowest_rate_seen
+from mixed_order_game.studies.claims.verdict import Verdict
+from mixed_order_game.studies.tune import tune
+from mixed_order_game.studies.validate import validate
+from mixed_order_game.theory.analysis import analyse
+from mixed_order_game.theory.constants import dynamics_constants, loop_constants
+from mixed_order_game.theory.game import read_game
+from mixed_order_game.theory.spectrum import linear_loop, monotonicity_constant, nash_equilibrium
 
 HEAD = """
 title = "Three sellers with exponential demand"

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 import mixed_order_game as mog
-from mixed_order_game.build import build_fmu
+from mixed_order_game.fmu.build import build_fmu
 from tests.games_by_hand import BY_HAND
 from tests.oracle.general_loop import Functions, GeneralLoop, equilibrium
 from tests.random_expressions import SMOOTH, random_game

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from mixed_order_game import read_model
-from mixed_order_game.graphs import (
+from mixed_order_game.game.graphs import (
     CommunicationGraph,
     GraphError,
     all_connected,

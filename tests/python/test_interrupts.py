@@ -14,10 +14,10 @@ import pytest
 from typer.testing import CliRunner
 
 from mixed_order_game import Simulator
-from mixed_order_game.cli import app
+from mixed_order_game.cli.app import app
 from mixed_order_game.interrupts import end_as_exceptions, noted_signals
-from mixed_order_game.sweeping import Sampler, Settings
-from mixed_order_game.tune import tune
+from mixed_order_game.studies.sampler import Sampler, Settings
+from mixed_order_game.studies.tune import tune
 
 
 def press(number: int = signal.SIGINT) -> None:

@@ -69,6 +69,6 @@ def test_only_the_room_of_a_version_of_fmi_knows_it(path: Path) -> None:
 
 
 def test_the_python_package_imports_packaging_from_the_standard_library_alone() -> None:
-    text = (ROOT / "python_harness/mixed_order_game/packaging.py").read_text(encoding="utf-8")
+    text = (ROOT / "python_harness/mixed_order_game/fmu/packaging.py").read_text(encoding="utf-8")
     modules = set(re.findall(r"^(?:from|import) (\S+)", text, re.MULTILINE))
     assert modules <= {"argparse", "collections.abc", "os", "pathlib", "re", "sys", "tempfile", "zipfile"}

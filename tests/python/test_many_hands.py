@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from mixed_order_game import SimulationError, Simulator
-from mixed_order_game.sweeping.sampler import Sampler, Settings
+from mixed_order_game.studies.sampler import Sampler, Settings
 
 
 def test_threads_that_share_a_simulator_wait_for_each_other(fmu: Path) -> None:

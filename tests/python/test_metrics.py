@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from mixed_order_game import ResultError, Simulator, read_model, run
-from mixed_order_game.metrics import (
+from mixed_order_game.results.metrics import (
     changed_values,
     control_energy,
     metrics,
@@ -17,7 +17,7 @@ from mixed_order_game.metrics import (
     sampled_metrics,
     settling_time,
 )
-from mixed_order_game.sweeping import Sampler, Settings
+from mixed_order_game.studies.sampler import Sampler, Settings
 
 
 def test_settling_time_of_an_exponential() -> None:

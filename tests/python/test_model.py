@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from mixed_order_game import ModelError, VariableError, build_fmu, default_game, read_model
-from mixed_order_game.analysis.game import read_game
-from mixed_order_game.authoring import check_game
-from mixed_order_game.model import check_value, provenance
+from mixed_order_game.fmu.model import check_value, provenance
+from mixed_order_game.game.check import check_game
+from mixed_order_game.theory.game import read_game
 from tests.conftest import FmuOf
 
 

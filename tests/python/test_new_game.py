@@ -8,11 +8,12 @@ import pytest
 from typer.testing import CliRunner, Result
 
 from mixed_order_game import GameError, build_fmu, read_model, run
-from mixed_order_game.authoring import Recipe, check_game, new_game
-from mixed_order_game.cli import app
-from mixed_order_game.graphs import GraphError
-from mixed_order_game.parameters import game_parameters
-from mixed_order_game.spectrum import linear_loop, monotonicity_constant, spectral_abscissa
+from mixed_order_game.cli.app import app
+from mixed_order_game.game.check import check_game
+from mixed_order_game.game.graphs import GraphError
+from mixed_order_game.game.new import Recipe, new_game
+from mixed_order_game.game.parameters import game_parameters
+from mixed_order_game.theory.spectrum import linear_loop, monotonicity_constant, spectral_abscissa
 
 GRAPHS = ["ring", "path", "star", "wheel", "complete", "tree", "random:0.5", "regular:2", "small-world:2:0.3"]
 

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from mixed_order_game import packaging
-from mixed_order_game.packaging import PackagingError, main, write_fmu
+from mixed_order_game.fmu import packaging
+from mixed_order_game.fmu.packaging import PackagingError, main, write_fmu
 
 MEMBERS = [
     "binaries/linux64/MixedOrderGame.so",

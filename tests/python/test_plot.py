@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from matplotlib.axes import Axes
 
-from mixed_order_game import PlotError, Result, ResultError, plot
+from mixed_order_game import PlotError, Result, ResultError
+from mixed_order_game.results import plot
 
 T, N = 400, 5
 ORDER = (1, 1, 1, 2, 2)

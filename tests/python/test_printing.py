@@ -10,8 +10,8 @@ from rich.table import Table
 from rich.text import Text
 from typer.testing import CliRunner
 
-from mixed_order_game import cli
-from mixed_order_game.printing import show, standard_output
+from mixed_order_game.cli import app as cli
+from mixed_order_game.cli.printing import show, standard_output
 
 HEADER = ("run", "settling time (s)", "control energy", "final error", "meaning")
 ROWS = (

@@ -18,9 +18,9 @@ from mixed_order_game import (
     load,
     read_model,
 )
-from mixed_order_game.analysis.game import read_game
-from mixed_order_game.authoring import check_game
-from mixed_order_game.schedule import read_disturbance, read_graph_schedule
+from mixed_order_game.fmu.schedule import read_disturbance, read_graph_schedule
+from mixed_order_game.game.check import check_game
+from mixed_order_game.theory.game import read_game
 
 MARK = b"\xef\xbb\xbf"
 INPUT = 'time,"d_ext[1,1]"\n0,1.5\n'

@@ -17,13 +17,20 @@ import pytest
 from typer.testing import CliRunner, Result
 
 from mixed_order_game import GameError, ResultError, Verdict, build_fmu, read_model, run
-from mixed_order_game.authoring import Recipe, new_game
-from mixed_order_game.cli import app
-from mixed_order_game.parameters import game_parameters
-from mixed_order_game.reporting import Evidence, evidence_of_game, evidence_of_result, render_page, report
-from mixed_order_game.reporting.evidence import energy_so_far, shared_signal, sphere_switches
+from mixed_order_game.cli.app import app
+from mixed_order_game.game.new import Recipe, new_game
+from mixed_order_game.game.parameters import game_parameters
+from mixed_order_game.reporting.evidence import (
+    Evidence,
+    energy_so_far,
+    evidence_of_game,
+    evidence_of_result,
+    shared_signal,
+    sphere_switches,
+)
 from mixed_order_game.reporting.figures import MOST_PLAYERS, figures
-from mixed_order_game.unknown_term import unknown_term
+from mixed_order_game.reporting.page import render_page, report
+from mixed_order_game.results.unknown_term import unknown_term
 
 EVERY_FIGURE = [
     "actions",

@@ -18,11 +18,11 @@ from mixed_order_game import (
     read_model,
     run,
 )
-from mixed_order_game.build import shipped_game
-from mixed_order_game.metrics import metrics
-from mixed_order_game.model import Value
+from mixed_order_game.fmu.build import shipped_game
+from mixed_order_game.fmu.model import Value
+from mixed_order_game.fmu.schedule import read_disturbance, read_graph_schedule
 from mixed_order_game.names import parse_name
-from mixed_order_game.schedule import read_disturbance, read_graph_schedule
+from mixed_order_game.results.metrics import metrics
 from tests.conftest import FmuOf
 
 OUTPUTS = ("x", "x_star", "nash_error")

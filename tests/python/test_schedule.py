@@ -8,8 +8,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from mixed_order_game import Model, Simulator, default_game, read_model
-from mixed_order_game.graphs import graph_of_text
-from mixed_order_game.schedule import (
+from mixed_order_game.fmu.schedule import (
     Disturbance,
     GraphSchedule,
     ScheduleError,
@@ -19,6 +18,7 @@ from mixed_order_game.schedule import (
     write_disturbance,
     write_graph_schedule,
 )
+from mixed_order_game.game.graphs import graph_of_text
 from tests.oracle.closed_loop import initial_state, state_rate, unpack
 from tests.oracle.game import read_game
 from tests.oracle.simulate import simulate

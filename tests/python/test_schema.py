@@ -16,8 +16,10 @@ import jsonschema
 import pytest
 from typer.testing import CliRunner
 
-from mixed_order_game.authoring import Recipe, check_game, game_schema, new_game, schema_path
-from mixed_order_game.cli import app
+from mixed_order_game.cli.app import app
+from mixed_order_game.game.check import check_game
+from mixed_order_game.game.new import Recipe, new_game
+from mixed_order_game.game.schema import game_schema, schema_path
 
 ROOT = Path(__file__).resolve().parents[2]
 GAMES = sorted(

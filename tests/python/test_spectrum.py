@@ -6,9 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mixed_order_game import GameError, read_model, spectrum
-from mixed_order_game.analysis.game import read_game as read_game_file
-from mixed_order_game.parameters import game_parameters
+from mixed_order_game import GameError, read_model
+from mixed_order_game.game.parameters import game_parameters
+from mixed_order_game.theory import spectrum
+from mixed_order_game.theory.game import read_game as read_game_file
 from tests.conftest import GAMES, FmuOf
 from tests.oracle import equilibrium, linear_loop
 from tests.oracle.game import Game, read_game

@@ -13,22 +13,15 @@ import pyarrow.parquet as pq
 import pytest
 
 from mixed_order_game import MixedOrderGameError, ModelError, PlotError, ResultError, VariableError
-from mixed_order_game.designs import DesignError, Range, Sampling
-from mixed_order_game.graphs import GraphError, graphs_of_text
-from mixed_order_game.sweeping import (
-    PoolError,
-    Sampler,
-    Settings,
-    Sweep,
-    SweepError,
-    SweepResult,
-    check_heat_map,
-    connected_graphs_example,
-    load_sweep,
-    plot_edges,
-    plot_heat_map,
-    sweep,
-)
+from mixed_order_game.game.graphs import GraphError, graphs_of_text
+from mixed_order_game.studies.designs import DesignError, Range, Sampling
+from mixed_order_game.studies.pool import PoolError
+from mixed_order_game.studies.sampler import Sampler, Settings
+from mixed_order_game.studies.sweep.conduct import connected_graphs_example, sweep
+from mixed_order_game.studies.sweep.definition import Sweep
+from mixed_order_game.studies.sweep.figures import check_heat_map, plot_edges, plot_heat_map
+from mixed_order_game.studies.sweep.store import SweepError
+from mixed_order_game.studies.sweep.table import SweepResult, load_sweep
 from tests.python import sweep_workers
 
 SHORT = Settings(stop_time=0.2)
@@ -141,7 +134,9 @@ def test_interrupted_sweep_resumes(how: signal.Signals, fmu: Path, tmp_path: Pat
     script.write_text(
         "import sys\n"
         "from pathlib import Path\n"
-        "from mixed_order_game.sweeping import Settings, Sweep, sweep\n"
+        "from mixed_order_game.studies.sampler import Settings\n"
+        "from mixed_order_game.studies.sweep.conduct import sweep\n"
+        "from mixed_order_game.studies.sweep.definition import Sweep\n"
         "from tests.python import sweep_workers\n"
         "if __name__ == '__main__':\n"
         "    grid = {'k1': tuple(5.0 + 0.1 * k for k in range(200))}\n"
@@ -187,7 +182,7 @@ def test_interrupted_sweep_resumes(how: signal.Signals, fmu: Path, tmp_path: Pat
 
 
 def test_two_sweeps_do_not_share_a_folder(fmu: Path, tmp_path: Path) -> None:
-    from mixed_order_game.sweeping.store import locked
+    from mixed_order_game.studies.sweep.store import locked
 
     with locked(tmp_path / "s"), pytest.raises(SweepError, match="another sweep is at work"):
         sweep(Sweep(fmu=fmu, settings=SHORT), tmp_path / "s")
@@ -208,7 +203,7 @@ def test_folder_of_a_start_that_was_killed(fmu: Path, tmp_path: Path) -> None:
     def killed_while_writing(name: str) -> None:
         text = (
             "import os, pathlib\n"
-            "from mixed_order_game.writing import write_whole\n"
+            "from mixed_order_game.files.writing import write_whole\n"
             f"write_whole(pathlib.Path({str(folder / name)!r}), lambda _: os.kill(os.getpid(), 9))"
         )
         assert subprocess.run([sys.executable, "-c", text], check=False).returncode == -signal.SIGKILL
@@ -299,7 +294,7 @@ def test_summary_and_medians(swept: SweepResult) -> None:
 
 
 def test_heat_maps(swept: SweepResult, tmp_path: Path) -> None:
-    from mixed_order_game.plot import save_figure
+    from mixed_order_game.results.plot import save_figure
 
     axes = plot_heat_map(swept, "k1", "k3", "control_energy")
     (image,) = axes.images

@@ -4,17 +4,13 @@ import json
 from pathlib import Path
 
 import pytest
-import typer
 from typer.testing import CliRunner, Result
 
-from mixed_order_game import compare_command, run, sweep_command, tune_command
-from mixed_order_game.cli import ErrorsAsSentences
-from mixed_order_game.sweeping import Sampler, load_sweep
-from mixed_order_game.sweeping.options import counted_progress
-
-app = typer.Typer(cls=ErrorsAsSentences, rich_markup_mode="rich", pretty_exceptions_enable=False)
-for module in (compare_command, sweep_command, tune_command):
-    module.register(app)
+from mixed_order_game import run
+from mixed_order_game.cli.app import app
+from mixed_order_game.cli.progress import counted_progress
+from mixed_order_game.studies.sampler import Sampler
+from mixed_order_game.studies.sweep.table import load_sweep
 
 
 def mog(*arguments: object) -> Result:

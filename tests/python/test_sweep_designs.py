@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import qmc
 
-from mixed_order_game.designs import (
+from mixed_order_game.studies.designs import (
     DesignError,
     Range,
     Sampling,

@@ -9,7 +9,7 @@ import pyarrow.parquet as pq
 import pytest
 from typer.testing import CliRunner
 
-from mixed_order_game.cli import app
+from mixed_order_game.cli.app import app
 
 DOCS = Path(__file__).resolve().parents[2] / "python_harness" / "docs"
 PAGES = ("sweep.md", "compare.md", "tune.md", "schedule.md")
@@ -49,7 +49,7 @@ def test_python(page: str) -> None:
 
 def test_edges_in_csv() -> None:
     from mixed_order_game import default_fmu, read_model
-    from mixed_order_game.schedule import read_graph_schedule
+    from mixed_order_game.fmu.schedule import read_graph_schedule
 
     Path("edges.csv").write_text(blocks("schedule.md", "csv")[0])
     schedule = read_graph_schedule("edges.csv", read_model(default_fmu()))

@@ -14,8 +14,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mixed_order_game.sweeping import PoolError, Settings, Sweep, sweep
-from mixed_order_game.sweeping.pool import WORKER_DIED, Case, Source, _loaded, run_chunk
+from mixed_order_game.studies.pool import WORKER_DIED, Case, PoolError, Source, _loaded, run_chunk
+from mixed_order_game.studies.sampler import Settings
+from mixed_order_game.studies.sweep.conduct import sweep
+from mixed_order_game.studies.sweep.definition import Sweep
 from mixed_order_game.version import package_version
 from tests.python import sweep_workers
 from tests.python.test_sweep import runs_of

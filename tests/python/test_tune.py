@@ -9,14 +9,14 @@ from scipy.linalg import expm
 from typer.testing import CliRunner
 
 from mixed_order_game import read_model
-from mixed_order_game.cli import app
-from mixed_order_game.designs import Range
+from mixed_order_game.cli.app import app
 from mixed_order_game.errors import VariableError
-from mixed_order_game.graphs import GraphError, graphs_of_text
-from mixed_order_game.parameters import game_parameters
-from mixed_order_game.spectrum import initial_deviation, linear_loop
-from mixed_order_game.sweeping import Sampler, Settings
-from mixed_order_game.tune import TuneError, linear_energy, stiff_response, tune
+from mixed_order_game.game.graphs import GraphError, graphs_of_text
+from mixed_order_game.game.parameters import game_parameters
+from mixed_order_game.studies.designs import Range
+from mixed_order_game.studies.sampler import Sampler, Settings
+from mixed_order_game.studies.tune import TuneError, linear_energy, stiff_response, tune
+from mixed_order_game.theory.spectrum import initial_deviation, linear_loop
 from tests.conftest import FmuOf
 
 

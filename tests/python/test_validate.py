@@ -19,16 +19,17 @@ from mixed_order_game import (
     read_model,
     validate,
 )
-from mixed_order_game.authoring import Recipe, new_game
-from mixed_order_game.claims.archive import archive_valid
-from mixed_order_game.claims.early_end import Ended
-from mixed_order_game.claims.equilibrium import nash_equilibrium_exists
-from mixed_order_game.claims.explanation import neighbourhood_bound
-from mixed_order_game.claims.perturbed_run import PerturbedRun, perturbed_run
-from mixed_order_game.claims.practical_convergence import Observed, observe, practical_convergence
-from mixed_order_game.claims.seeking_error import TANH_CONSTANT, bound_of_seeking_error
-from mixed_order_game.claims.settling import Maxima, horizons, least_window, window_maxima, window_of
-from mixed_order_game.claims.unperturbed_loop import (
+from mixed_order_game.game.new import Recipe, new_game
+from mixed_order_game.game.parameters import game_parameters
+from mixed_order_game.studies.claims.archive import archive_valid
+from mixed_order_game.studies.claims.early_end import Ended
+from mixed_order_game.studies.claims.equilibrium import nash_equilibrium_exists
+from mixed_order_game.studies.claims.explanation import neighbourhood_bound
+from mixed_order_game.studies.claims.perturbed_run import PerturbedRun, perturbed_run
+from mixed_order_game.studies.claims.practical_convergence import Observed, observe, practical_convergence
+from mixed_order_game.studies.claims.seeking_error import TANH_CONSTANT, bound_of_seeking_error
+from mixed_order_game.studies.claims.settling import Maxima, horizons, least_window, window_maxima, window_of
+from mixed_order_game.studies.claims.unperturbed_loop import (
     Spectrum,
     largest_disagreement,
     spectrum_of,
@@ -36,7 +37,6 @@ from mixed_order_game.claims.unperturbed_loop import (
     unperturbed_loop_stable,
     unperturbed_run,
 )
-from mixed_order_game.parameters import game_parameters
 from tests.conftest import FmuOf
 from tests.judge_random_games import false_verdicts, judge
 from tests.random_games import UNSOUND, sound_game

@@ -10,21 +10,12 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from mixed_order_game import (
-    BuildError,
-    Result,
-    ResultError,
-    Simulator,
-    build_fmu,
-    cli,
-    default_game,
-    load,
-    plot,
-    run,
-)
-from mixed_order_game.model import read_model
-from mixed_order_game.schedule import GraphSchedule, write_disturbance, write_graph_schedule
-from mixed_order_game.writing import FIGURE, RESULT, check_output, write_whole
+from mixed_order_game import BuildError, Result, ResultError, Simulator, build_fmu, default_game, load, run
+from mixed_order_game.cli import app as cli
+from mixed_order_game.files.writing import FIGURE, RESULT, check_output, write_whole
+from mixed_order_game.fmu.model import read_model
+from mixed_order_game.fmu.schedule import GraphSchedule, write_disturbance, write_graph_schedule
+from mixed_order_game.results import plot
 
 
 def result() -> Result:

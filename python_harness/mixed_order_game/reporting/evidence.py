@@ -7,19 +7,19 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..claims.tolerances import PLAIN_TOLERANCE, TOLERANCE
-from ..claims.unperturbed_loop import LARGEST_LINEAR_LOOP
-from ..definition import has_expressions
 from ..errors import ResultError
-from ..model import Model, Value
+from ..fmu.model import Model, Value
+from ..fmu.run import Simulator
+from ..game.definition import has_expressions
+from ..game.parameters import game_parameters
 from ..names import parse_name
-from ..parameters import game_parameters
-from ..results import Result
-from ..run import Simulator
-from ..spectrum import linear_loop, spectral_abscissa
+from ..results.result import Result
+from ..results.unknown_term import UNKNOWN, recorded_for_unknown_term, unknown_term
+from ..studies.claims.tolerances import PLAIN_TOLERANCE, TOLERANCE
+from ..studies.claims.unperturbed_loop import LARGEST_LINEAR_LOOP
+from ..studies.validate import Validation, validate
+from ..theory.spectrum import linear_loop, spectral_abscissa
 from ..times import in_seconds
-from ..unknown_term import UNKNOWN, recorded_for_unknown_term, unknown_term
-from ..validate import Validation, validate
 
 FloatArray = NDArray[np.float64]
 

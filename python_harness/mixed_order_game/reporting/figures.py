@@ -15,10 +15,17 @@ from matplotlib.colors import to_hex
 from numpy.typing import NDArray
 
 from ..errors import ResultError
-from ..metrics import metrics
 from ..names import indices_of
-from ..plot import BELOW_FLOOR, PALETTE, SMALLEST_ERROR, earlier_equilibria, edges_of, integrator_floor
-from ..results import Result
+from ..results.metrics import metrics
+from ..results.plot import (
+    BELOW_FLOOR,
+    PALETTE,
+    SMALLEST_ERROR,
+    earlier_equilibria,
+    edges_of,
+    integrator_floor,
+)
+from ..results.result import Result
 from .evidence import Evidence, energy_so_far, shared_signal, sphere_switches, weight_bound
 
 FloatArray = NDArray[np.float64]

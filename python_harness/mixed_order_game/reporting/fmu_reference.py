@@ -9,7 +9,7 @@ import sys
 from collections.abc import Sequence
 
 from ..errors import MixedOrderGameError
-from ..model import Model, Variable, read_model
+from ..fmu.model import Model, Variable, read_model
 from ..names import parse_name
 
 INDICES = {"center": "m", "a": "i,j", "cost_coupling": "i,j", "y": "i,j,l", "y0": "i,j,l", "W": "i,m,l"}

@@ -11,14 +11,14 @@ from typing import Any
 import numpy as np
 
 from ..errors import GameError
-from ..metrics import SETTLED, changed_values, metrics
-from ..model import Value, provenance
+from ..files.writing import PAGE, RESULT, check_output, write_file
+from ..fmu.model import Value, provenance
+from ..game.parameters import game_parameters
 from ..names import parse_name
-from ..parameters import game_parameters
-from ..plot import edges_of
-from ..results import Result, load
+from ..results.metrics import SETTLED, changed_values, metrics
+from ..results.plot import edges_of
+from ..results.result import Result, load
 from ..version import package_version
-from ..writing import PAGE, RESULT, check_output, write_file
 from .evidence import Evidence, energy_so_far, evidence_of_game, evidence_of_result
 from .figures import figures
 
@@ -58,7 +58,7 @@ def report(
     The page replaces a page, with force any file but the source; that is judged before any run.
     Raises what running, judging and loading raise; ResultError if the page cannot be written.
     """
-    from ..build import SOURCE_OR_RESULT, fmu_of
+    from ..fmu.build import SOURCE_OR_RESULT, fmu_of
 
     output = Path(output)
     check_output(output, PAGE, inputs=[source], force=force)

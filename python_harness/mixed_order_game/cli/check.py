@@ -1,0 +1,33 @@
+"""The command `mog check`: parses options and prints."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def check(
+    games: Annotated[list[Path], typer.Argument(help="Game files (.toml).", show_default=False)],
+) -> None:
+    """Check game files: tell problems with their lines, exit code 1 if there is one.
+
+    [bold]Example:[/bold] mog check my_game.toml
+    """
+    from ..errors import GameError
+    from ..game.check import check_game
+
+    broken = False
+    for game in games:
+        try:
+            problems = check_game(game)
+        except GameError as error:
+            typer.echo(f"mog: {error}", err=True)
+            broken = True
+            continue
+        for problem in problems:
+            typer.echo(f"{game}:{problem.line}: {problem.sentence}", err=True)
+        if not problems:
+            typer.echo(f"{game} is valid")
+        broken = broken or bool(problems)
+    if broken:
+        raise typer.Exit(1)

@@ -1,0 +1,1 @@
+"""Files: how a user's files are read, how results are written, temporary folders."""

@@ -1,0 +1,1 @@
+"""FMUs: made from game files, read, run, with inputs and graphs that change during the run."""

@@ -1,0 +1,361 @@
+"""What an FMU says about itself: sizes, parameters, variables, capabilities, and where its values come from.
+
+Reads modelDescription.xml (through fmpy) and resources/game.toml from the archive; runs nothing.
+"""
+
+import difflib
+import sys
+import zipfile
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Any, TypeVar
+
+import fmpy
+import numpy as np
+
+from ..errors import ModelError, VariableError, reason
+from ..files.reading import expect_file, read_text, text_of, toml_of
+from ..game.definition import expressions_of, with_defaults
+from ..names import parse_name
+from .build import default_game, fmu_of
+
+MODEL_IDENTIFIER = "MixedOrderGame"
+Value = float | bool
+Entry = TypeVar("Entry")
+
+CAPABILITIES = (
+    "canHandleVariableCommunicationStepSize",
+    "canInterpolateInputs",
+    "maxOutputDerivativeOrder",
+    "canGetAndSetFMUstate",
+    "canSerializeFMUstate",
+    "providesDirectionalDerivative",
+    "canBeInstantiatedOnlyOncePerProcess",
+    "needsExecutionTool",
+)
+
+
+@dataclass(frozen=True)
+class Variable:
+    """One variable of the model description; start, minimum and maximum in `unit`, None when not declared."""
+
+    name: str
+    reference: int
+    type: str  # Real, Integer or Boolean
+    causality: str
+    variability: str
+    start: Value | None
+    minimum: float | None
+    maximum: float | None
+    unit: str | None
+    description: str
+
+    @property
+    def settable_before_start(self) -> bool:
+        """Whether a run may set it before initialization."""
+        return self.causality in ("parameter", "input") and self.variability != "constant"
+
+    @property
+    def settable_during_run(self) -> bool:
+        """Whether a run may set it at a communication point."""
+        return self.causality == "input" or (self.causality == "parameter" and self.variability == "tunable")
+
+
+@dataclass(frozen=True)
+class Model:
+    """An FMU's own account of its game. N players, D coordinates, q neurons."""
+
+    path: Path
+    name: str
+    description: str
+    guid: str
+    generation_tool: str
+    fmi_version: str
+    stop_time: float  # s, default experiment
+    step: float  # s, default experiment
+    tolerance: float  # relative, default experiment
+    capabilities: Mapping[str, Mapping[str, bool | int]]  # by interface
+    variables: Mapping[str, Variable]  # in the order of the file
+    game: Mapping[str, Any] = field(repr=False)  # resources/game.toml as tables, its defaults applied
+
+    @cached_property
+    def order(self) -> tuple[int, ...]:
+        """(N,), 1 velocity-driven, 2 acceleration-driven."""
+        entries = self.indexed("order")
+        return tuple(int(entries[(i,)].start or 0) for i in range(1, len(entries) + 1))
+
+    @property
+    def players(self) -> int:
+        """N."""
+        return len(self.order)
+
+    @cached_property
+    def dimension(self) -> int:
+        """D."""
+        return max(index[1] for index in self.indexed("x"))
+
+    @property
+    def neurons(self) -> int:
+        """q."""
+        return len(self.game["rbf"]["centers"])
+
+    @property
+    def title(self) -> str:
+        """Title of the game."""
+        return str(self.game["title"])
+
+    @property
+    def player_names(self) -> tuple[str, ...]:
+        """(N,)."""
+        return tuple(str(player["name"]) for player in self.game["player"])
+
+    @cached_property
+    def expressions(self) -> Mapping[str, Sequence[int]]:
+        """1-based numbers of the players whose cost, dynamics or disturbance has an expression; by part."""
+        return expressions_of(self.game)
+
+    @cached_property
+    def _groups(self) -> dict[str, dict[tuple[int, ...], Variable]]:
+        groups: dict[str, dict[tuple[int, ...], Variable]] = {}
+        for variable in self.variables.values():
+            stem, index = parse_name(variable.name)
+            groups.setdefault(stem, {})[index] = variable
+        return groups
+
+    def indexed(self, stem: str) -> Mapping[tuple[int, ...], Variable]:
+        """Variables of one kind by their 1-based indices: indexed("x")[1, 2] is x[1,2]; empty if none."""
+        return self._groups.get(stem, {})
+
+    def variable(self, name: str) -> Variable:
+        """The variable of that name. Raises VariableError naming the nearest ones."""
+        if name not in self.variables:
+            raise self._unknown(name, self.variables)
+        return self.variables[name]
+
+    def select(self, names: Iterable[str]) -> list[Variable]:
+        """Variables by name; x stands for every x[i,l], der(x) for every der(x[i,l]), each once.
+
+        Raises VariableError.
+        """
+        chosen: dict[str, Variable] = {}
+        for name in names:
+            rates = self._rates(name)
+            if name in self.variables:
+                chosen[name] = self.variables[name]
+            elif name in self._groups:
+                chosen |= {variable.name: variable for variable in self._groups[name].values()}
+            elif rates:
+                chosen |= {rate: self.variables[rate] for rate in rates}
+            else:
+                raise self._unknown(name, [*self._groups, *self.variables])
+        return list(chosen.values())
+
+    def expanded(self, values: Mapping[str, Entry]) -> dict[str, Entry]:
+        """The values by single variables: a name without indices stands for all of its kind, as in select.
+
+        Raises VariableError for a name that does not exist and a variable that two names set.
+        """
+        expanded: dict[str, Entry] = {}
+        set_by: dict[str, str] = {}
+        for name, value in values.items():
+            for variable in self.select([name]):
+                single = variable.name
+                if single in set_by:
+                    raise VariableError(f"{single} is set by both {set_by[single]} and {name}")
+                set_by[single], expanded[single] = name, value
+        return expanded
+
+    def _rates(self, name: str) -> list[str]:
+        """Names of all time derivatives of one kind, der(x[1,1]), ... for der(x); none for another name."""
+        if not (name.startswith("der(") and name.endswith(")")):
+            return []
+        stem = name.removeprefix("der(").removesuffix(")")
+        named = (f"der({variable.name})" for variable in self.indexed(stem).values())
+        return [rate for rate in named if rate in self.variables]
+
+    @staticmethod
+    def _unknown(name: str, known: Iterable[str]) -> VariableError:
+        near = difflib.get_close_matches(name, dict.fromkeys(known), n=3, cutoff=0.5)
+        hint = f"; did you mean {' or '.join(near)}?" if near else ""
+        return VariableError(f"there is no variable {name}{hint}")
+
+    @property
+    def edges(self) -> tuple[tuple[int, int, float], ...]:
+        """Communication graph: (i, j, weight) with i < j, 1-based, positive weights."""
+        return tuple(
+            (i, j, float(variable.start))
+            for (i, j), variable in sorted(self.indexed("a").items())
+            if variable.start
+        )
+
+    @property
+    def gains(self) -> dict[str, float]:
+        """Start values of the gains by name; k1 to k4 in 1/s."""
+        names = ("k1", "k2", "k3", "k4", "beta", "delta", "epsilon", "rho", "W_max")
+        return {name: float(self.variable(name).start or 0.0) for name in names}
+
+    @cached_property
+    def is_paper_example(self) -> bool:
+        """Whether the FMU's game is the paper's example that comes with this package.
+
+        Title, exposure and the two switches of the strategy may differ: they change no value of the game.
+        """
+        paper = toml_of(read_text(default_game()))
+        free = dict.fromkeys(("title", "expose", "strategy"))
+        return {**paper, **free} == {**self.game, **free}
+
+    def start_values(self, changes: Mapping[str, Value] | None = None) -> dict[str, Value]:
+        """Every parameter and input with its start value, changes in place of the model's own.
+
+        In changes a name without indices stands for all of its kind.
+        Raises VariableError for a change that the FMU would not take.
+        """
+        values = {
+            name: variable.start
+            for name, variable in self.variables.items()
+            if variable.causality in ("parameter", "input") and variable.start is not None
+        }
+        for name, value in self.expanded(changes or {}).items():
+            values[name] = check_value(self.variable(name), value)
+        return values
+
+
+def _range_of(variable: Variable) -> str:
+    low, high = variable.minimum, variable.maximum
+    if high is None and low == sys.float_info.min:  # how a schema says "positive"
+        return "a positive number"
+    if high is None:
+        return f"a number of at least {low:g}"
+    if low is None:
+        return f"a number of at most {high:g}"
+    return f"a number from {low:g} to {high:g}"
+
+
+def check_value(variable: Variable, value: object, *, during_run: bool = False) -> Value:
+    """The value as float, int or bool, if the variable can be set to it at that time.
+
+    Raises VariableError: not settable, wrong type, not finite, or outside [minimum, maximum].
+    """
+    name = variable.name
+    kind = f"{variable.variability} {variable.causality}"
+    if not variable.settable_before_start:
+        raise VariableError(f"{name} cannot be set: it is a {kind}")
+    if during_run and not variable.settable_during_run:
+        raise VariableError(f"{name} cannot be set during a run: it is a {kind}")
+    if isinstance(value, np.generic) or (isinstance(value, np.ndarray) and value.ndim == 0):
+        value = value.item()
+    if variable.type == "Boolean":
+        if not isinstance(value, bool):
+            raise VariableError(f"{name} is true or false, not {value!r}")
+        return value
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise VariableError(f"{name} is a number, not {value!r}")
+    if not np.isfinite(value):
+        raise VariableError(f"{name} must be finite, not {value}")
+    below = variable.minimum is not None and value < variable.minimum
+    above = variable.maximum is not None and value > variable.maximum
+    if below or above:
+        raise VariableError(f"{name} is {value:g}, expected {_range_of(variable)}")
+    return float(value)
+
+
+def read_model(fmu: Path | str | None = None) -> Model:
+    """Read an FMU of this project, or that of a game file or of a game of the package by its name.
+
+    None stands for the paper's example. Raises ModelError for a file that is no FMU of this project or cannot
+    be read, GameError and BuildError as cached_fmu does.
+    """
+    path = fmu_of(fmu)
+    expect_file(path, "FMU", ModelError)
+    try:
+        with zipfile.ZipFile(path) as archive:
+            game = with_defaults(toml_of(text_of(archive.read("resources/game.toml"))))
+        description = fmpy.read_model_description(str(path), validate=False)
+    except KeyError as error:
+        raise ModelError(f"{path} is not an FMU of this project: {error.args[0]}") from error
+    except Exception as error:  # zipfile, lxml and fmpy raise what they please for a broken file
+        raise ModelError(f"{path} cannot be read as an FMU: {reason(error)}") from error
+    interface = description.coSimulation
+    if interface is None or interface.modelIdentifier != MODEL_IDENTIFIER:
+        raise ModelError(f"{path} is not an FMU of this project: it has no co-simulation {MODEL_IDENTIFIER}")
+
+    experiment = description.defaultExperiment
+    interfaces = {"co-simulation": interface, "model exchange": description.modelExchange}
+    return Model(
+        path=path,
+        name=description.modelName,
+        description=description.description or "",
+        guid=description.guid,
+        generation_tool=description.generationTool or "",
+        fmi_version=description.fmiVersion,
+        stop_time=float(experiment.stopTime),
+        step=float(experiment.stepSize),
+        tolerance=float(experiment.tolerance),
+        capabilities={
+            kind: {name: getattr(each, name) for name in CAPABILITIES if hasattr(each, name)}
+            for kind, each in interfaces.items()
+            if each is not None
+        },
+        variables={variable.name: _variable(variable) for variable in description.modelVariables},
+        game=game,
+    )
+
+
+def _variable(scalar: Any) -> Variable:
+    declared = scalar.declaredType
+
+    def attribute(name: str) -> Any:
+        """The variable's own attribute, else that of its declared type."""
+        own = getattr(scalar, name)
+        return getattr(declared, name) if own is None and declared is not None else own
+
+    def number(name: str) -> float | None:
+        text = attribute(name)
+        return None if text is None else float(text)
+
+    start: Value | None = None
+    if scalar.start is not None:
+        start = scalar.start in ("true", "1") if scalar.type == "Boolean" else float(scalar.start)
+    return Variable(
+        name=scalar.name,
+        reference=scalar.valueReference,
+        type=scalar.type,
+        causality=scalar.causality,
+        variability=scalar.variability,
+        start=start,
+        minimum=number("min"),
+        maximum=number("max"),
+        unit=attribute("unit"),
+        description=scalar.description or "",
+    )
+
+
+@dataclass(frozen=True)
+class Provenance:
+    """Where one group of values of the paper's example comes from."""
+
+    group: str
+    names: Sequence[str]
+    source: str  # "the paper's" or "ours"
+
+
+PAPER_EXAMPLE_PROVENANCE = (
+    Provenance("costs", ("cost_quadratic", "cost_linear", "cost_coupling"), "the paper's"),
+    Provenance("unknown dynamics g", ("dynamics_gain",), "the paper's"),
+    Provenance("disturbances d", ("disturbance_amplitude", "disturbance_frequency"), "the paper's"),
+    Provenance("RBF centres and width", ("center", "rho"), "the paper's"),
+    Provenance("weight bound and adaptation", ("W_max", "beta"), "the paper's"),
+    Provenance("robust term", ("delta", "epsilon"), "the paper's"),
+    Provenance("initial actions and velocities", ("x0", "v0"), "the paper's"),
+    Provenance("gains", ("k1", "k2", "k3", "k4"), "ours: the paper prints none"),
+    Provenance("communication graph", ("a",), "ours: the paper's figure was not at hand"),
+    Provenance("initial references and estimates", ("z0", "y0"), "ours: zero, the paper does not say"),
+)
+"""The paper's example group by group: which values are printed in the paper and which are decided here."""
+
+
+def provenance(model: Model) -> tuple[Provenance, ...]:
+    """Sources of the paper's example; empty for any other game, whose file is its source."""
+    return PAPER_EXAMPLE_PROVENANCE if model.is_paper_example else ()

@@ -1,0 +1,499 @@
+"""Runs an FMU through fmpy's co-simulation slave, one communication step at a time.
+
+fmpy.simulate_fmu is not used: a Simulator keeps its instance between runs (reset instead of load), reads any
+variable, reports progress, sets inputs and tunable parameters on the way and turns the FMU's log into errors.
+"""
+
+import os
+import shutil
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from ctypes import POINTER, c_double, c_int, c_uint
+from itertools import pairwise
+from pathlib import Path
+from threading import Lock
+from types import TracebackType
+from typing import Any, Self, cast
+
+import fmpy
+import numpy as np
+from fmpy.fmi1 import FMICallException
+from fmpy.fmi2 import FMU2Slave, defaultCallbacks, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE, fmi2Discard
+from numpy.typing import ArrayLike, NDArray
+
+from ..arguments import array_argument, number_argument
+from ..errors import SimulationError
+from ..files.temporary import explained, new_folder
+from ..interrupts import noted_signals
+from ..names import split_names
+from ..results.result import Result
+from ..times import in_seconds
+from ..version import package_version
+from .model import Model, Value, Variable, check_value, read_model
+from .schedule import Disturbance
+from .turn import Turn, in_turn
+
+Inputs = Disturbance | Callable[[float], ArrayLike] | ArrayLike
+"""External disturbance d_ext: rows over time, a function of the time in s giving
+(N, D), or an array (N, D) or (T, N, D)."""
+
+Changes = Mapping[float, Mapping[str, Value]]
+"""Tunable parameters and inputs to set during the run: time in s -> name -> value."""
+
+Progress = Callable[[float], None]
+"""Called with the time reached, in s, after every step."""
+
+_loading = Lock()
+
+LARGEST_SAMPLES = 10_000_000
+LEFT_OUT = ("y", "W")
+"""Estimates and weights: N^2 D and N q D columns, recorded only when asked for, like all time derivatives."""
+
+
+def run(
+    fmu: Path | str | None = None,
+    *,
+    start_values: Mapping[str, Value] | None = None,
+    stop_time: float | None = None,
+    start_time: float = 0.0,
+    step: float = 0.02,
+    tolerance: float = 1e-6,
+    outputs: Sequence[str] | None = None,
+    inputs: Inputs | None = None,
+    changes: Changes | None = None,
+    progress: Progress | None = None,
+) -> Result:
+    """Run an FMU, or a game, once. For several runs of one use Simulator, whose run() this is."""
+    with Simulator(fmu) as simulator:
+        return simulator.run(
+            start_values=start_values,
+            stop_time=stop_time,
+            start_time=start_time,
+            step=step,
+            tolerance=tolerance,
+            outputs=outputs,
+            inputs=inputs,
+            changes=changes,
+            progress=progress,
+        )
+
+
+@contextmanager
+def _in_place() -> Iterator[None]:
+    """Keep the working directory: fmpy changes it while it loads a library, and for good when that fails."""
+    with _loading:
+        here = os.getcwd()  # noqa: PTH109
+        try:
+            yield
+        finally:
+            os.chdir(here)
+
+
+class Simulator:
+    """One FMU, unpacked and loaded once, run as often as wanted. Use it in a with statement.
+
+    Threads that share one wait for each other; to run at the same time each needs its own.
+
+    fmu: a file (.fmu), or a game, of which it is made on first use: a game file (.toml), a game of the
+    package by its name, or None for the paper's example.
+    Raises what read_model raises, SimulationError if the FMU cannot be loaded on this machine.
+    """
+
+    def __init__(self, fmu: Path | str | None = None) -> None:
+        self.model: Model = read_model(fmu)
+        self._messages: list[tuple[int, str]] = []
+        self._turn = Turn()
+        self._process = os.getpid()
+        self._folder: Path | None = None
+        self._slave: Any = None
+        try:
+            with noted_signals():
+                self._folder = new_folder(SimulationError)
+                self._load(self._folder)
+        except BaseException:  # of a signal, too
+            self.close()
+            raise
+        self._used = False
+
+    def _load(self, folder: Path) -> None:
+        """Unpack, load the library and make an instance, which needs the files no longer."""
+        try:
+            fmpy.extract(str(self.model.path), unzipdir=folder)
+            self._callbacks = fmi2CallbackFunctions()
+            self._callbacks.logger = fmi2CallbackLoggerTYPE(self._log)
+            self._callbacks.allocateMemory = defaultCallbacks.allocateMemory
+            self._callbacks.freeMemory = defaultCallbacks.freeMemory
+            with _in_place():
+                slave = FMU2Slave(
+                    guid=self.model.guid,
+                    modelIdentifier="MixedOrderGame",
+                    unzipDirectory=str(folder),
+                    instanceName="mixed_order_game",
+                )
+            slave.instantiate(callbacks=self._callbacks)
+            self._slave = slave
+        except Exception as error:  # fmpy raises bare Exceptions
+            said = self._said() or explained(error, folder)
+            raise SimulationError(f"{self.model.path} cannot be loaded: {said}") from error
+        if os.name == "posix":  # elsewhere a library that is in use cannot be removed
+            shutil.rmtree(folder, ignore_errors=True)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Free the instance and remove what is left of the unpacked files. Closing twice is allowed.
+
+        In a forked process nothing is freed: that is its parent's. Raises SimulationError from within a run.
+        """
+        if os.getpid() != self._process:
+            self._slave = None
+            return
+        self._free()
+
+    @in_turn
+    def _free(self) -> None:
+        if self._slave is not None:
+            self._slave.freeInstance()
+            self._slave = None
+        if self._folder is not None:
+            shutil.rmtree(self._folder, ignore_errors=True)
+
+    @in_turn
+    def run(
+        self,
+        *,
+        start_values: Mapping[str, Value] | None = None,
+        stop_time: float | None = None,
+        start_time: float = 0.0,
+        step: float = 0.02,
+        tolerance: float = 1e-6,
+        outputs: Sequence[str] | None = None,
+        inputs: Inputs | None = None,
+        changes: Changes | None = None,
+        progress: Progress | None = None,
+    ) -> Result:
+        """Run from start_time to stop_time, in s, and sample every step, both ends included.
+
+        start_time: any, Unix time, say; disturbances are functions of it. stop_time: default start_time plus
+            the FMU's stop time.
+        start_values: parameters and inputs to set first, others keep the FMU's start values; a stands for
+            every a[i,j], here, in changes and in outputs.
+        step: communication step in s; the last one is shorter if the horizon is not a multiple of it.
+        tolerance: relative tolerance of the integrator.
+        outputs: names to record; x stands for every x[i,l], der(x) for every der(x[i,l]). Default: all
+            outputs and locals but y, W and the time derivatives. x_star is always recorded.
+        inputs: external disturbance d_ext: a function of the time in s giving (N, D), or an array (N, D), or
+            (T, N, D) with one row a sample, each held over each communication step at the value of its
+            beginning; or a schedule.Disturbance, whose rows act exactly at their times, held or straight
+            between them.
+        changes: tunable parameters and inputs set on the way, each before the step that begins at its time.
+            A sample at the time of a change is taken before it.
+
+        The times of changes and of a Disturbance's rows become communication points when they lie between two
+        samples; samples are taken at the same times as without them.
+
+        Raises VariableError for a variable that does not exist or does not take its value, SimulationError
+        for times, shapes and tolerances that make no sense and for whatever the FMU refuses.
+        """
+        if self._slave is None:
+            raise SimulationError("the simulator is closed")
+        if stop_time is None:
+            stop_time = number_argument(start_time, "start_time", SimulationError) + self.model.stop_time
+        start_time, stop_time, step, tolerance = (
+            number_argument(value, name, SimulationError)
+            for name, value in (
+                ("start_time", start_time),
+                ("stop_time", stop_time),
+                ("step", step),
+                ("tolerance", tolerance),
+            )
+        )
+        time = _samples(start_time, stop_time, step)
+        if not (np.isfinite(tolerance) and 0.0 < tolerance < 1.0):
+            raise SimulationError(f"tolerance = {tolerance:g} is not between 0 and 1")
+        start = self.model.expanded(start_values or {})
+        parameters = self.model.start_values(start)
+        schedule = _schedule(self.model, changes or {}, time)
+        disturbance = _disturbance(self.model, inputs, time)
+        if inputs is not None:
+            _check_set_once(self.model, [start, *schedule.values()])
+        recorder = _Recorder(self._slave, self._recorded(outputs), len(time))
+        points = np.union1d(time, [*schedule, *disturbance.times]).tolist()
+
+        try:
+            with noted_signals() as take_signals:
+                self._initialize({name: parameters[name] for name in start}, time, tolerance)
+                disturbance.set(self._slave, points[0])
+                self._slave.exitInitializationMode()
+                recorder.read(0)
+                sample = 1
+                for begin, end in pairwise(points):
+                    take_signals()
+                    disturbance.set(self._slave, begin)
+                    if begin in schedule:
+                        self._set(schedule[begin])
+                    self._slave.doStep(begin, end - begin)
+                    if end == time[sample]:
+                        recorder.read(sample)
+                        sample += 1
+                        if progress is not None:
+                            progress(end)
+                self._slave.terminate()
+        except FMICallException as error:
+            raise SimulationError(self._said() or str(error)) from error
+
+        return Result(
+            time=time,
+            columns=recorder.columns(),
+            units={variable.name: variable.unit or "" for variable in recorder.variables},
+            parameters=parameters,
+            title=self.model.title,
+            guid=self.model.guid,
+            package_version=package_version(),
+            stop_time=stop_time,
+            step=step,
+            tolerance=tolerance,
+            messages=tuple(message for _, message in self._messages),
+            changed={
+                name: value for name, value in parameters.items() if self.model.variable(name).start != value
+            },
+        )
+
+    def _initialize(self, values: Mapping[str, Value], time: NDArray[np.float64], tolerance: float) -> None:
+        self._messages.clear()
+        if self._used:
+            self._slave.reset()
+        self._used = True
+        self._slave.setupExperiment(tolerance=tolerance, startTime=float(time[0]), stopTime=float(time[-1]))
+        self._set(values)
+        self._slave.enterInitializationMode()
+
+    def _set(self, values: Mapping[str, Value]) -> None:
+        variables = self.model.variables
+        for kind, setter in (("Real", "setReal"), ("Integer", "setInteger"), ("Boolean", "setBoolean")):
+            chosen = {name: value for name, value in values.items() if variables[name].type == kind}
+            if chosen:
+                references = [variables[name].reference for name in chosen]
+                getattr(self._slave, setter)(references, list(chosen.values()))
+
+    def _recorded(self, outputs: Sequence[str] | None) -> list[Variable]:
+        if isinstance(outputs, str):  # as the command takes them
+            outputs = split_names(outputs)
+        if outputs is not None:
+            return self.model.select([*outputs, "x_star"])
+        left_out = {variable.name for stem in LEFT_OUT for variable in self.model.indexed(stem).values()}
+        left_out |= {name for name in self.model.variables if name.startswith("der(")}
+        return [
+            variable
+            for variable in self.model.variables.values()
+            if variable.causality in ("output", "local", "calculatedParameter")
+            and variable.variability != "constant"
+            and variable.name not in left_out
+        ]
+
+    def _log(self, _: object, _name: bytes, status: int, _category: bytes, message: bytes) -> None:
+        self._messages.append((status, message.decode("utf-8", errors="replace")))
+
+    def _said(self) -> str:
+        """The last error that the FMU logged; empty if it logged none."""
+        return next((text for status, text in reversed(self._messages) if status >= fmi2Discard), "")
+
+
+class _Recorder:
+    """Reads the chosen variables straight into the rows of two arrays, one for reals, one for integers."""
+
+    def __init__(self, slave: Any, variables: Sequence[Variable], samples: int) -> None:
+        self.variables = variables
+        self._slave = slave
+        self._reals = [variable for variable in variables if variable.type == "Real"]
+        self._integers = [variable for variable in variables if variable.type != "Real"]
+        self._real_references = _references(self._reals)
+        self._integer_references = _references(self._integers)
+        self._real_values = np.empty((samples, len(self._reals)))
+        self._integer_values = np.empty((samples, len(self._integers)), dtype=np.int32)
+
+    def read(self, sample: int) -> None:
+        component = self._slave.component
+        if self._reals:
+            row = self._real_values[sample].ctypes.data_as(POINTER(c_double))
+            self._slave.fmi2GetReal(component, self._real_references, len(self._reals), row)
+        if self._integers:
+            row_of_integers = self._integer_values[sample].ctypes.data_as(POINTER(c_int))
+            self._slave.fmi2GetInteger(
+                component, self._integer_references, len(self._integers), row_of_integers
+            )
+
+    def columns(self) -> dict[str, NDArray[np.float64]]:
+        """Columns in the order of the variables; integers below 2^53 are exact as floats."""
+        columns = {
+            variable.name: np.ascontiguousarray(self._real_values[:, position])
+            for position, variable in enumerate(self._reals)
+        }
+        columns |= {
+            variable.name: self._integer_values[:, position].astype(np.float64)
+            for position, variable in enumerate(self._integers)
+        }
+        return {variable.name: columns[variable.name] for variable in self.variables}
+
+
+class _Inputs:
+    """The external disturbance d_ext at the communication points; this one is none."""
+
+    def __init__(self, model: Model, times: Sequence[float] = ()) -> None:
+        self.times = times  # communication points that the disturbance asks for
+        self._shape = (model.players, model.dimension)
+        names = model.indexed("d_ext")
+        self._references = _references([names[index] for index in sorted(names)])
+        self._buffer = (c_double * len(names))()
+
+    def set(self, slave: Any, time: float) -> None:
+        """Set the inputs for the step that begins at a communication point."""
+
+    def _give(self, slave: Any, values: NDArray[np.float64]) -> None:
+        self._buffer[:] = cast("Any", values.ravel().tolist())
+        slave.fmi2SetReal(slave.component, self._references, len(self._buffer), self._buffer)
+
+
+class _Function(_Inputs):
+    """A function of the time in s, asked at every communication point."""
+
+    def __init__(self, model: Model, function: Callable[[float], ArrayLike]) -> None:
+        super().__init__(model)
+        self._function = function
+
+    def set(self, slave: Any, time: float) -> None:
+        value = array_argument(self._function(time), f"inputs({time:.15g})", SimulationError)
+        if value.shape != self._shape:
+            raise SimulationError(f"inputs({time:.15g}) has the shape {value.shape}, not {self._shape}")
+        _check_finite(value, f"inputs({time:.15g})")
+        self._give(slave, value)
+
+
+class _Rows(_Inputs):
+    """Rows (T, N, D), each held from its time on, or changing at a rate (T, N, D) until the next one."""
+
+    def __init__(
+        self,
+        model: Model,
+        times: Sequence[float],
+        values: NDArray[np.float64],
+        rates: NDArray[np.float64] | None = None,
+    ) -> None:
+        super().__init__(model, times)
+        self._rows = dict(zip(times, range(len(times)), strict=True))
+        self._values = values
+        self._rates = rates
+        self._orders = (c_int * len(self._buffer))(*[1] * len(self._buffer))
+
+    def set(self, slave: Any, time: float) -> None:
+        row = self._rows.get(time)
+        if row is None:
+            return
+        self._give(slave, self._values[row])
+        if self._rates is not None:
+            self._buffer[:] = cast("Any", self._rates[row].ravel().tolist())
+            slave.fmi2SetRealInputDerivatives(
+                slave.component, self._references, len(self._buffer), self._orders, self._buffer
+            )
+
+
+def _disturbance(model: Model, inputs: Inputs | None, samples: NDArray[np.float64]) -> _Inputs:
+    """The inputs of a run, their shapes and values checked as far as they are known."""
+    if inputs is None:
+        return _Inputs(model)
+    shape = (model.players, model.dimension)
+    if isinstance(inputs, Disturbance):
+        return _rows_of(model, inputs, samples)
+    if callable(inputs):
+        return _Function(model, inputs)
+    array = array_argument(inputs, "inputs", SimulationError)
+    if array.shape not in (shape, (len(samples), *shape)):
+        raise SimulationError(f"inputs has the shape {array.shape}, not {shape} or {(len(samples), *shape)}")
+    _check_finite(array, "inputs")
+    return _Rows(model, samples.tolist(), np.broadcast_to(array, (len(samples), *shape)))
+
+
+def _rows_of(model: Model, inputs: Disturbance, samples: NDArray[np.float64]) -> _Rows:
+    """What is in force at the start, and every row between start and stop."""
+    shape = (model.players, model.dimension)
+    if inputs.values.shape[1:] != shape:
+        raise SimulationError(f"a row of inputs has the shape {inputs.values.shape[1:]}, not {shape}")
+    times = _on_samples(inputs.time, samples)
+    last = np.diff(times, append=np.inf) > 0.0  # of rows that rounding put on one sample
+    moved = Disturbance(times[last], inputs.values[last], inputs.linear)
+    start, stop = samples[[0, -1]]
+    points = [float(start), *moved.time[(start < moved.time) & (moved.time < stop)].tolist()]
+    values, rates = zip(*map(moved.at, points), strict=True)
+    return _Rows(model, points, np.array(values), np.array(rates) if inputs.linear else None)
+
+
+def _samples(start: float, stop: float, step: float) -> NDArray[np.float64]:
+    """Times start, start + step, ..., stop."""
+    if not (np.isfinite(start) and np.isfinite(stop) and start < stop):
+        raise SimulationError(f"stop_time = {in_seconds(stop)} is not after start_time = {in_seconds(start)}")
+    if not (np.isfinite(step) and step > 0.0):
+        raise SimulationError(f"step = {step:g} s is not positive")
+    intervals = (stop - start) / step
+    if intervals > LARGEST_SAMPLES:
+        raise SimulationError(f"step = {step:g} s gives more than {LARGEST_SAMPLES} samples")
+    whole = max(1, round(intervals))
+    spacing = float(np.spacing(max(abs(start), abs(stop))))
+    if abs(intervals - whole) <= 1e-9 * whole + 2.0 * spacing / step:
+        times = start + (stop - start) * (np.arange(whole + 1) / whole)
+    else:
+        times = np.append(start + step * np.arange(int(intervals) + 1), stop)
+    if np.diff(times).min() <= 0.0:
+        raise SimulationError(f"step = {step:g} s is below the resolution of times at {in_seconds(stop)}")
+    return times
+
+
+def _schedule(model: Model, changes: Changes, samples: NDArray[np.float64]) -> dict[float, dict[str, Value]]:
+    """The changes by time, their values checked; a time that is nearly a sample's becomes that sample's."""
+    schedule: dict[float, dict[str, Value]] = {}
+    start, stop = float(samples[0]), float(samples[-1])
+    times = {number_argument(when, "the time of a change", SimulationError): when for when in changes}
+    when = np.array(sorted(times), dtype=np.float64)
+    for time, point in zip(when.tolist(), _on_samples(when, samples).tolist(), strict=True):
+        if not start <= point < stop:
+            raise SimulationError(
+                f"the change at {in_seconds(time)} is outside [{start:.15g}, {stop:.15g}) s"
+            )
+        values = {
+            name: check_value(model.variable(name), value, during_run=True)
+            for name, value in model.expanded(changes[times[time]]).items()
+        }
+        schedule.setdefault(point, {}).update(values)
+    return schedule
+
+
+def _on_samples(times: NDArray[np.float64], samples: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The times, those of a sample put right where rounding has moved them."""
+    after = np.clip(np.searchsorted(samples, times), 1, len(samples) - 1)
+    before = after - 1
+    nearest = np.where(times - samples[before] < samples[after] - times, samples[before], samples[after])
+    span, largest = samples[-1] - samples[0], np.abs(samples).max()
+    slack = 1e-9 * span + 4.0 * np.spacing(largest)
+    return np.where(np.abs(times - nearest) <= slack, nearest, times)
+
+
+def _check_set_once(model: Model, values: Iterable[Mapping[str, Value]]) -> None:
+    inputs = {variable.name for variable in model.indexed("d_ext").values()}
+    twice = next((name for each in values for name in each if name in inputs), None)
+    if twice is not None:
+        raise SimulationError(f"{twice} is set twice: by inputs and by start_values or changes")
+
+
+def _references(variables: Iterable[Variable]) -> Any:
+    numbers = [variable.reference for variable in variables]
+    return (c_uint * len(numbers))(*numbers)
+
+
+def _check_finite(array: NDArray[np.float64], name: str) -> None:
+    if not np.all(np.isfinite(array)):
+        raise SimulationError(f"{name} must be finite")

@@ -1,0 +1,1 @@
+"""Results: trajectories as arrays and files, what is measured on them, and figures."""

@@ -1,0 +1,1 @@
+"""Studies: what takes several runs: claims judged, variants compared, gains sought, designs swept."""

@@ -1,0 +1,54 @@
+"""The claim that there is a Nash equilibrium for the actions to converge to."""
+
+import numpy as np
+
+from ...errors import GameError
+from ...game.definition import has_expressions
+from ...game.parameters import GameParameters
+from ...theory.spectrum import monotonicity_constant, nash_equilibrium
+from .verdict import Claim, Verdict
+
+FLAT = 1e-12
+"""Curvatures of this part of their terms are zero to rounding."""
+
+
+def nash_equilibrium_exists(game: GameParameters) -> Claim:
+    """Gradients vanish at one point and no player's own cost is concave there.
+
+    An FMU whose costs have expressions cannot be instantiated unless it found such a point.
+    """
+    expression = has_expressions(game.expressions, "cost")
+    if expression:
+        return Claim(
+            "nash_equilibrium",
+            "All gradients vanish at x*, and no cost is concave there in its player's own action",
+            Verdict.HOLDS,
+            f"The FMU's search found x*. As {expression}, it is not proved that x* is the only equilibrium, "
+            "or more than a local one.",
+        )
+    verdict, reason = _judge(game)
+    figures = {"m": monotonicity_constant(game)}
+    return Claim("nash_equilibrium", "There is a unique Nash equilibrium x*", verdict, reason, figures)
+
+
+def _judge(game: GameParameters) -> tuple[Verdict, str]:
+    coupling = game.cost_coupling - np.diag(np.diag(game.cost_coupling))
+    curvature = game.cost_quadratic + coupling.sum(axis=1)
+    scale = np.abs(game.cost_quadratic) + np.abs(coupling).sum(axis=1)
+    least = int(np.argmin(np.where(scale > 0.0, curvature / np.where(scale > 0.0, scale, 1.0), 0.0)))
+    if curvature[least] < -FLAT * scale[least]:
+        return Verdict.FAILS, (
+            f"The cost of player {least + 1} is concave in its own action, curvature "
+            f"{2.0 * curvature[least]:.3g}: where the gradients vanish it has a maximum."
+        )
+    try:
+        nash_equilibrium(game)
+    except GameError:
+        return Verdict.FAILS, "The gradients of all players do not vanish at exactly one point."
+    m = monotonicity_constant(game)
+    if m > 0.0:
+        return Verdict.HOLDS, f"The pseudo-gradient is strongly monotone, m = {m:.3g}."
+    return Verdict.HOLDS, (
+        "Every cost is convex in its player's own action; the pseudo-gradient is not strongly monotone as "
+        f"the theorems suppose, m = {m:.3g}."
+    )

@@ -1,0 +1,240 @@
+"""Judges the paper's claims on an FMU: Theorems 1 and 2, Lemma 3, and what they rest on.
+
+One rule for every game. The switches `robust` and `perturbed` are set for each run, whatever the game says.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from ..errors import SimulationError
+from ..fmu.model import Model
+from ..fmu.run import Progress, Simulator
+from ..game.definition import has_expressions
+from ..game.parameters import GameParameters, game_parameters
+from ..results.result import Result
+from ..results.unknown_term import UNKNOWN, FloatArray, recorded_for_unknown_term
+from .claims.archive import archive_valid
+from .claims.early_end import Ended, run_or_end
+from .claims.equilibrium import nash_equilibrium_exists
+from .claims.explanation import explain
+from .claims.neighbourhood import within_neighbourhood
+from .claims.perturbed_run import PerturbedRun
+from .claims.practical_convergence import Observed, nothing_to_observe, observe, practical_convergence
+from .claims.tolerances import TOLERANCE
+from .claims.unperturbed_loop import (
+    run_until_decay_is_seen,
+    spectrum_of,
+    unperturbed_actions_converge,
+    unperturbed_loop_stable,
+    unperturbed_run,
+)
+from .claims.verdict import Claim, Verdict
+from .claims.weights import weights_bounded
+
+__all__ = ["LIMIT", "Claim", "Validation", "Verdict", "validate"]
+
+LIMIT = 1000.0
+"""Longest simulated time of a robust run, in s, in which it may settle."""
+
+Report = Callable[[str, float], None]
+
+
+@dataclass(frozen=True, eq=False)
+class Validation:
+    """All claims about one FMU, with the runs that figures show."""
+
+    model: Model
+    claims: tuple[Claim, ...]
+    notes: tuple[str, ...]  # why the neighbourhood has its size, and what else is worth knowing
+    robust: Result | None  # the default experiment, robust and perturbed; None if it ended early
+    plain: Result | None  # neither robust nor perturbed, until everything has decayed; None likewise
+
+    @property
+    def passed(self) -> bool:
+        """Whether no claim fails."""
+        return not self.named(Verdict.FAILS)
+
+    @property
+    def holds(self) -> bool:
+        """Whether every claim holds."""
+        return len(self.named(Verdict.HOLDS)) == len(self.claims)
+
+    def named(self, *verdicts: Verdict) -> list[str]:
+        """Names of the claims with one of these verdicts."""
+        return [claim.name for claim in self.claims if claim.verdict in verdicts]
+
+    def summary(self) -> str:
+        """How many claims have which verdict."""
+        if self.holds:
+            return "Every claim holds"
+        counts = [(len(self.named(verdict)), verdict.value) for verdict in Verdict]
+        told = ", ".join(
+            f"{count} {verdict if count == 1 else verdict.removesuffix('s')}"
+            for count, verdict in counts
+            if count
+        )
+        return f"Of {len(self.claims)} claims: {told}"
+
+    def problem(self, *, strict: bool = False) -> str:
+        """Which claims fail, or with strict do not hold, for a command that then exits with 1; else empty."""
+        counted = [Verdict.FAILS, Verdict.NOT_COVERED, Verdict.NOT_SETTLED] if strict else [Verdict.FAILS]
+        told = [f"{', '.join(self.named(each))}: {each.value}" for each in counted if self.named(each)]
+        return "; ".join(told)
+
+    def as_json(self) -> dict[str, Any]:
+        """Plain values for json.dumps; a figure that is not finite becomes None."""
+
+        def plain(claim: Claim) -> dict[str, Any]:
+            figures = {name: value if math.isfinite(value) else None for name, value in claim.figures.items()}
+            return {**asdict(claim), "verdict": claim.verdict.value, "figures": figures}
+
+        return {
+            "fmu": str(self.model.path),
+            "title": self.model.title,
+            "guid": self.model.guid,
+            "passed": self.passed,
+            "holds": self.holds,
+            "claims": [plain(claim) for claim in self.claims],
+            "notes": list(self.notes),
+        }
+
+
+def validate(
+    fmu: Path | str,
+    *,
+    limit: float = LIMIT,
+    neighbourhood: float | None = None,
+    progress: Report | None = None,
+) -> Validation:
+    """Run the FMU as long as it takes and judge every claim.
+
+    limit: longest simulated time of a robust run, in s, in which it may settle.
+    neighbourhood: largest |x - x*| wanted once settled, in the game's length unit; judged as one more claim.
+    progress is called with the name of a run and the part of it done, 0 to 1.
+    Raises ModelError or SimulationError if the FMU cannot be read or loaded, SimulationError for a limit or a
+    neighbourhood that is not positive.
+    """
+    for name, value in (("limit", limit), ("neighbourhood", neighbourhood)):
+        if value is not None and not (math.isfinite(value) and value > 0.0):
+            raise SimulationError(f"{name} = {value:g} is not positive")
+    with Simulator(fmu) as simulator:
+        model = simulator.model
+        game = game_parameters(model)
+        if has_expressions(game.expressions, "cost"):
+            game = replace(game, x_star=_equilibrium_of(simulator))
+        equilibrium = nash_equilibrium_exists(game)
+        if equilibrium.verdict is Verdict.FAILS:
+            claims = [
+                equilibrium,
+                *nothing_to_observe(game, Verdict.FAILS, equilibrium.reason),
+                archive_valid(model.path),
+            ]
+            return Validation(model, tuple(claims), (), None, None)
+        spectrum = spectrum_of(game)
+        plain: Result | Ended
+        if has_expressions(game.expressions, "cost"):
+            plain, spectrum = run_until_decay_is_seen(simulator, game, spectrum, limit, progress)
+        else:
+            plain = unperturbed_run(simulator, game, spectrum, progress=progress)
+        stability = unperturbed_loop_stable(game, spectrum)
+        convergence = unperturbed_actions_converge(game, spectrum, plain)
+        robust = _default_experiment(simulator, game, progress)
+        observed = None
+        practical = _practical_despite(game, stability, convergence) or _unmeasured(model, game)
+        if not practical:
+            observed = observe(
+                simulator, game, slowest_rate=spectrum.slowest_rate, limit=limit, progress=progress
+            )
+            practical = practical_convergence(observed)
+    claims = [equilibrium, *practical]
+    if neighbourhood is not None:
+        claims.append(within_neighbourhood(practical[0], neighbourhood))
+    runs = [run.result for run in _runs(observed)] + ([robust] if isinstance(robust, Result) else [])
+    claims += [weights_bounded(runs, game), stability, convergence, archive_valid(model.path)]
+    return Validation(
+        model=model,
+        claims=tuple(claims),
+        notes=(*(explain(run, game) for run in _runs(observed)[:1]), *_notes(game)),
+        robust=robust if isinstance(robust, Result) else None,
+        plain=plain if isinstance(plain, Result) else None,
+    )
+
+
+def _default_experiment(
+    simulator: Simulator, game: GameParameters, progress: Report | None
+) -> Result | Ended:
+    model = simulator.model
+
+    def run(stop: float, follow: Progress) -> Result:
+        return simulator.run(
+            start_values={"robust": True, "perturbed": True},
+            stop_time=stop,
+            step=model.step,
+            tolerance=TOLERANCE,
+            progress=follow,
+        )
+
+    def report(time: float) -> None:
+        if progress is not None:
+            progress("default", time / model.stop_time)
+
+    return run_or_end(run, game, model.stop_time, report)
+
+
+def _practical_despite(game: GameParameters, stability: Claim, convergence: Claim) -> list[Claim]:
+    """Theorem 1's claims where Theorem 2's decide them already, by an unstable loop; empty where not.
+
+    Large loops are not examined for stability: there the actions that leave x* show it.
+    """
+    if stability.verdict is Verdict.FAILS:
+        unstable = f"spectral abscissa {stability.figures['abscissa']:.4g} 1/s"
+    elif stability.verdict is Verdict.NOT_COVERED and convergence.verdict is Verdict.FAILS:
+        unstable = "its actions leave x*"
+    else:
+        return []
+    reason = (
+        f"The unperturbed loop is unstable, {unstable}, and the robust part, being bounded, cannot hold "
+        "actions that are far enough from x*."
+    )
+    return nothing_to_observe(game, Verdict.FAILS, reason)
+
+
+def _unmeasured(model: Model, game: GameParameters) -> list[Claim]:
+    """Theorem 1's claims where the FMU does not show the unknown term; empty where it does."""
+    if recorded_for_unknown_term(model) is not None:
+        return []
+    unknown = has_expressions(game.expressions, *UNKNOWN)
+    reason = (
+        f"The residual g + d - W'S cannot be measured: {unknown}, and an FMU that exposes outputs alone has "
+        "no time derivatives."
+    )
+    return nothing_to_observe(game, Verdict.NOT_COVERED, reason)
+
+
+def _notes(game: GameParameters) -> list[str]:
+    """What settling rests on where the game file does not tell it."""
+    notes = []
+    cost, disturbance = (has_expressions(game.expressions, part) for part in ("cost", "disturbance"))
+    if cost:
+        notes.append(f"The slowest rate is that of the unperturbed run: {cost}.")
+    if disturbance:
+        notes.append(
+            "Whether the windows in which settling is judged span every period, and samples resolve it, "
+            f"is not known: {disturbance}."
+        )
+    return notes
+
+
+def _equilibrium_of(simulator: Simulator) -> FloatArray:
+    """x* (N, D) of the FMU, from a run that hardly begins."""
+    moment = 1e-6 * simulator.model.stop_time
+    return simulator.run(stop_time=moment, step=moment, outputs=["x", "x_star"]).x_star
+
+
+def _runs(observed: Observed | None) -> list[PerturbedRun]:
+    if observed is None:
+        return []
+    return [run for run in (observed.run, observed.quarter) if isinstance(run, PerturbedRun)]
