@@ -7,13 +7,32 @@
 
 namespace mixed_order_game {
 
-ClosedLoop::ClosedLoop(Parameters parameters) : parameters_(std::move(parameters)), layout_(parameters_.shape) {
+GainRows::GainRows(const Shape& shape) {
+  for (AlignedVector* row : {&k, &k2, &beta, &delta, &sharpness, &steepest}) row->resize(at(shape.actions()));
+}
+
+void GainRows::refresh(const Shape& shape, const Gains& gains) {
+  for (int entry = 0; entry < shape.actions(); ++entry) {
+    const std::size_t p = at(entry);
+    const std::size_t i = at(shape.player_of(entry));
+    k[p] = shape.order[i] == 2 ? gains.k4[i] : gains.k1[i];
+    k2[p] = gains.k2[i];
+    beta[p] = gains.beta[i];
+    delta[p] = gains.delta[i];
+    sharpness[p] = robust_term_constant * gains.delta[i] / gains.epsilon[i];
+    steepest[p] = robust_term_constant * gains.delta[i] * gains.delta[i] / gains.epsilon[i];
+  }
+}
+
+ClosedLoop::ClosedLoop(Parameters parameters)
+    : parameters_(std::move(parameters)), layout_(parameters_.shape), gains_(parameters_.shape) {
   refresh();
 }
 
 void ClosedLoop::refresh() {
   parameters_.disturbance->time_origin = time_origin_;
   parameters_.refresh();
+  gains_.refresh(parameters_.shape, parameters_.gains);
 }
 
 void ClosedLoop::set_time_origin(Real time_origin) {
@@ -41,16 +60,15 @@ void ClosedLoop::evaluate_errors(const Real* state, Signals& signals) const {
       const int p = l * shape.players + i;
       const bool second = shape.is_second_order(i);
       signals.shared[at(p)] = terms::shared_signal(second, x[p], reference[p]);
-      e[p] = terms::error(second, x[p], reference[p], gains.k2, gradient[p]);
+      e[p] = terms::error(second, x[p], reference[p], gains_.k2[at(p)], gradient[p]);
     }
   }
 }
 
 void ClosedLoop::evaluate_robust_term(Signals& signals) const {
   // phi_i = delta tanh(K delta e_i / epsilon)
-  const Gains& gains = parameters_.gains;
-  kernels().scaled_tanh(shape().actions(), gains.delta, robust_term_constant * gains.delta / gains.epsilon,
-                        signals.error.data(), signals.robust.data());
+  kernels().scaled_tanh(shape().actions(), gains_.delta.data(), gains_.sharpness.data(), signals.error.data(),
+                        signals.robust.data());
 }
 
 void ClosedLoop::evaluate_network(const Real* state, Signals& signals) const {
@@ -94,7 +112,7 @@ void ClosedLoop::evaluate(Real t, const Real* state, const Real* d_ext, const Mo
   if (strategy.robust) {
     for (int p = 0; p < n; ++p)
       signals.radial[at(p)] = modes[at(p)] != 0 && e[p] * s[p] >= 0.0 ? s[p] / rbf.W_max : 0.0;
-    kernel.weight_rates(n, shape.neurons, gains.beta, e, signals.radial.data(), signals.activation.data(),
+    kernel.weight_rates(n, shape.neurons, gains_.beta.data(), e, signals.radial.data(), signals.activation.data(),
                         state + layout_.weights(), rate + layout_.weights());
   } else {
     std::fill(rate + layout_.weights(), rate + layout_.size(), 0.0);
@@ -112,14 +130,14 @@ void ClosedLoop::evaluate(Real t, const Real* state, const Real* d_ext, const Mo
     for (int i = 0; i < players; ++i) {
       const int p = l * players + i;
       const bool second = shape.is_second_order(i);
-      const Real u = terms::control(second ? gains.k4 : gains.k1, e[p], s[p], phi[p]);
+      const Real u = terms::control(gains_.k[at(p)], e[p], s[p], phi[p]);
       const Real driven = u + g[p] + d[p];
       signals.control[at(p)] = u;
       rate[layout_.x() + p] = second ? reference[p] : driven;  // x' = v or x' = u + g + d
-      rate[layout_.reference() + p] = second ? driven : terms::reference_rate(gains.k2, gradient[p]);
+      rate[layout_.reference() + p] = second ? driven : terms::reference_rate(gains_.k2[at(p)], gradient[p]);
     }
   }
-  kernel.estimate_rates(players, shape.dimension, graph.neighbours(), gains.k3, state + layout_.estimates(),
+  kernel.estimate_rates(players, shape.dimension, graph.neighbours(), gains.k3.data(), state + layout_.estimates(),
                         signals.shared.data(), rate + layout_.estimates());
 }
 
@@ -136,7 +154,6 @@ void ClosedLoop::event_functions(const Real* state, const Modes& modes, Real tol
     return;
   }
   const Real W_max = parameters_.rbf.W_max;
-  const Real beta = parameters_.gains.beta;
   weight_norms(state, values);
   if (std::any_of(modes.begin(), modes.end(), [](auto mode) { return mode != 0; })) {
     evaluate_errors(state, signals);
@@ -144,7 +161,7 @@ void ClosedLoop::event_functions(const Real* state, const Modes& modes, Real tol
   }
   for (std::size_t p = 0; p < modes.size(); ++p) {
     const Real height = values[p] / W_max - 1.0;
-    const Real rate = 2.0 * beta * signals.error[p] * signals.network[p] / W_max;  // of w'w / W_max, inside
+    const Real rate = 2.0 * gains_.beta[p] * signals.error[p] * signals.network[p] / W_max;  // of w'w / W_max, inside
     const Real value = modes[p] == 0 ? height : std::min(-tolerance - height, -rate);
     values[p] = value == 0.0 ? -almost_zero : value;
   }

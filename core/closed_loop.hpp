@@ -10,6 +10,19 @@
 
 namespace mixed_order_game {
 
+/// The gains as rows of a joint action, at entry(i, l), and what is computed from them alone.
+struct GainRows {
+  explicit GainRows(const Shape& shape);
+  void refresh(const Shape& shape, const Gains& gains);
+
+  AlignedVector k;  ///< k1 (order 1) or k4 (order 2)
+  AlignedVector k2;
+  AlignedVector beta;
+  AlignedVector delta;
+  AlignedVector sharpness;  ///< K delta / epsilon
+  AlignedVector steepest;   ///< K delta^2 / epsilon, the largest slope of the robust term
+};
+
 class ClosedLoop {
  public:
   explicit ClosedLoop(Parameters parameters);
@@ -25,6 +38,7 @@ class ClosedLoop {
 
   [[nodiscard]] const Shape& shape() const { return parameters_.shape; }
   [[nodiscard]] const StateLayout& layout() const { return layout_; }
+  [[nodiscard]] const GainRows& gains() const { return gains_; }
 
   /// state[size()] at the start of a run, from x0, z0, v0, y0 and W = 0.
   void initial_state(Real* state) const { initial_state(parameters_.initial, state); }
@@ -40,11 +54,11 @@ class ClosedLoop {
   /// phi of the signals' errors.
   void evaluate_robust_term(Signals& signals) const;
 
-  /// d phi / d e = K delta^2 / epsilon (1 - (phi / delta)^2), from phi.
-  [[nodiscard]] Real robust_term_slope(Real phi) const {
-    const Gains& gains = parameters_.gains;
-    const Real tanh = gains.delta != 0.0 ? phi / gains.delta : 0.0;
-    return robust_term_constant * gains.delta * gains.delta / gains.epsilon * ((1.0 - tanh) * (1.0 + tanh));
+  /// d phi / d e = K delta^2 / epsilon (1 - (phi / delta)^2) of an entry p = entry(i, l), from phi.
+  [[nodiscard]] Real robust_term_slope(std::size_t p, Real phi) const {
+    const Real delta = gains_.delta[p];
+    const Real tanh = delta != 0.0 ? phi / delta : 0.0;
+    return gains_.steepest[p] * ((1.0 - tanh) * (1.0 + tanh));
   }
 
   /// The part of the signals that every player computes from its own state and estimates: xbar, gradient, error,
@@ -75,6 +89,7 @@ class ClosedLoop {
  private:
   Parameters parameters_;
   StateLayout layout_;
+  GainRows gains_;
   Real time_origin_ = 0.0;
 };
 

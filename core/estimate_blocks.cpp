@@ -2,14 +2,24 @@
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
+#include <cmath>
 
 namespace mixed_order_game {
 
-void EstimateBlocks::analyse(const CommunicationGraph& graph, int dimension) {
+void EstimateBlocks::analyse(const CommunicationGraph& graph, const std::vector<Real>& k3, int dimension) {
   factored_ = 0.0;
   players_ = graph.players();
   dimension_ = dimension;
+  k3_ = k3[0];
+  scale_.clear();
+  if (std::any_of(k3.begin(), k3.end(), [&](Real other) { return other != k3_; })) {
+    for (const Real own : k3) scale_.push_back(std::sqrt(own / k3_));
+  }
   gain_.resize(at(players_) * at(players_));
+  seen_.clear();
+  for (int i = 0; i < players_; ++i) {
+    for (int j = 0; j < players_; ++j) seen_.push_back(scale(i) * graph.weight(i, j));
+  }
   if (by_modes()) {
     find_modes(graph);
   } else {
@@ -28,10 +38,17 @@ void EstimateBlocks::find_modes(const CommunicationGraph& graph) {
     laplacian(i, i) += graph.weight(i, k);
     laplacian(k, k) += graph.weight(i, k);
   }
+  for (int i = 0; i < N; ++i) {
+    for (int k = 0; k < N; ++k) laplacian(i, k) *= scale(i) * scale(k);
+  }
   for (int j = 0; j < N; ++j) {
-    Eigen::VectorXd seen(N);  // a_.j
-    for (int i = 0; i < N; ++i) seen(i) = graph.weight(i, j);
-    const Eigen::MatrixXd block = laplacian + Eigen::MatrixXd(seen.asDiagonal());
+    Eigen::VectorXd seen(N);
+    Eigen::VectorXd own(N);  // diagonal of S diag(a_.j) S
+    for (int i = 0; i < N; ++i) {
+      seen(i) = seen_[at(i * N + j)];
+      own(i) = scale(i) * seen(i);
+    }
+    const Eigen::MatrixXd block = laplacian + Eigen::MatrixXd(own.asDiagonal());
     const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(block);
     const Eigen::VectorXd shared = solver.eigenvectors().transpose() * seen;
     for (int p = j; p < n; p += N) {
@@ -55,39 +72,42 @@ void EstimateBlocks::find_pattern(const CommunicationGraph& graph) {
   for (int k = 0; k < elimination_.listed; ++k) {
     for (int a = elimination_.start[at(k)]; a < elimination_.start[at(k + 1)]; ++a) {
       player_.push_back(order[at(elimination_.row[at(a)])]);
-      edge_.push_back(graph.weight(order[at(k)], player_.back()));
+      const int i = order[at(k)];
+      edge_.push_back(scale(i) * graph.weight(i, player_.back()) * scale(player_.back()));
     }
   }
   edge_.resize(at(elimination_.entries()));
   for (int i = elimination_.listed; i < n; ++i) {
     for (int k = elimination_.listed; k < i; ++k) {
-      edge_[at(elimination_.full_entry(i, k))] = graph.weight(order[at(k)], order[at(i)]);
+      const Real weight = graph.weight(order[at(k)], order[at(i)]);
+      edge_[at(elimination_.full_entry(i, k))] = scale(order[at(k)]) * weight * scale(order[at(i)]);
     }
   }
   for (int k = 0; k < n; ++k) {
     Real degree = 0.0;
     for (int i = 0; i < n; ++i) degree += graph.weight(order[at(k)], i);
-    degree_.push_back(degree);
+    degree_.push_back(scale(order[at(k)]) * degree * scale(order[at(k)]));
   }
   const std::size_t padded = at((n + tile_length - 1) / tile_length * tile_length);
   lower_.resize(edge_.size() * padded);
   diagonal_.resize(at(n) * padded);
 }
 
-void EstimateBlocks::factor(const CommunicationGraph& graph, Real gamma_k3) {
+void EstimateBlocks::factor(Real gamma) {
+  const Real gamma_k3 = gamma * k3_;
   if (gamma_k3 == factored_) return;
   factored_ = gamma_k3;
   if (by_modes()) {
     kernels().factor_modes(modes(), gamma_k3, inverse_.data(), gain_.data());
-    return;
+  } else {
+    factor_tiles(gamma_k3);
   }
+  scale_rows(1, gain_.data());
+}
+
+void EstimateBlocks::factor_tiles(Real gamma_k3) {
   const int n = players_;
-  const NeighbourRows rows = graph.neighbours();
-  std::fill(gain_.begin(), gain_.end(), 0.0);
-  for (int i = 0; i < n; ++i) {
-    for (int e = rows.start[i]; e < rows.start[i + 1]; ++e)
-      gain_[at(i * n + rows.neighbour[e])] = gamma_k3 * rows.weight[e];
-  }
+  kernels().scale(n * n, gamma_k3, seen_.data(), gain_.data());
   for (int first = 0; first < n; first += tile_length) {  // blocks first .. last - 1
     const int last = std::min(n, first + tile_length);
     Real* lower = lower_.data() + at(first) * edge_.size();
@@ -97,7 +117,9 @@ void EstimateBlocks::factor(const CommunicationGraph& graph, Real gamma_k3) {
     for (int k = 0; k < n; ++k) {
       Real* row = diagonal + k * tile_length;
       std::fill_n(row, tile_length, 1.0 + gamma_k3 * degree_[at(k)]);
-      for (int j = first; j < last; ++j) row[j - first] += gain_[at(elimination_.order[at(k)] * n + j)];
+      for (int j = first; j < last; ++j) {
+        row[j - first] += scale(elimination_.order[at(k)]) * gain_[at(elimination_.order[at(k)] * n + j)];
+      }
     }
     kernels().factor_blocks(pattern(), lower, diagonal);
   }
@@ -105,10 +127,23 @@ void EstimateBlocks::factor(const CommunicationGraph& graph, Real gamma_k3) {
 }
 
 void EstimateBlocks::solve(Real* rows) const {
+  if (!scale_.empty()) {
+    const int n = players_ * dimension_;
+    for (int i = 0; i < players_; ++i) kernels().scale(n, 1.0 / scale_[at(i)], rows + i * n, rows + i * n);
+  }
   if (by_modes()) {
     kernels().solve_modes(modes(), inverse_.data(), rows);
   } else {
     kernels().solve_blocks(pattern(), dimension_, lower_.data(), diagonal_.data(), rows);
+  }
+  scale_rows(dimension_, rows);
+}
+
+/// S times the rows, of width * N entries.
+void EstimateBlocks::scale_rows(int width, Real* rows) const {
+  const int n = players_ * width;
+  for (int i = 0; i < static_cast<int>(scale_.size()); ++i) {
+    kernels().scale(n, scale_[at(i)], rows + i * n, rows + i * n);
   }
 }
 

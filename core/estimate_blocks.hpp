@@ -1,9 +1,13 @@
 // The part of the Newton matrix that belongs to the estimates.
 //
 // The consensus law couples y_ij only with y_kj of the same j and coordinate, so I - gamma J splits into the N matrices
-// B_j = I + gamma k3 (L + diag(a_.j)), each used for every coordinate. All have the pattern of the graph: one symbolic
-// analysis (minimum degree), and a numeric L D L' that treats the N blocks side by side. For few players it is faster
-// to have the eigenvectors of all L + diag(a_.j), which no gamma changes: factorizing is then a division for each.
+// B_j = I + gamma K3 (L + diag(a_.j)) with K3 the diagonal of k3, each used for every coordinate. All have the pattern
+// of the graph: one symbolic analysis (minimum degree), and a numeric L D L' that treats the N blocks side by side. For
+// few players it is faster to have the eigenvectors of all L + diag(a_.j), which no gamma changes: factorizing is then
+// a division for each.
+//
+// Where k3 differs from player to player, K3 = k3_1 S^2 with a diagonal S, and S^-1 B_j S is symmetric: the same
+// methods work on  I + gamma k3_1 S (L + diag(a_.j)) S  between two scalings of rows.
 #pragma once
 
 #include <vector>
@@ -15,22 +19,25 @@ namespace mixed_order_game {
 
 class EstimateBlocks {
  public:
-  /// Symbolic analysis, or eigenvectors; needed again when the graph has changed.
-  void analyse(const CommunicationGraph& graph, int dimension);
+  /// Symbolic analysis, or eigenvectors; needed again when the graph or k3, one for each player, has changed.
+  void analyse(const CommunicationGraph& graph, const std::vector<Real>& k3, int dimension);
 
-  /// Numeric factors for gamma k3 > 0.
-  void factor(const CommunicationGraph& graph, Real gamma_k3);
+  /// Numeric factors for gamma > 0.
+  void factor(Real gamma);
 
   /// Solves for rows y_i of dimension * N entries, in place.
   void solve(Real* rows) const;
 
-  /// gain[i * N + j] = d y_ij / d xbar_j when everything else is eliminated: column j is gamma k3 B_j^-1 a_.j.
+  /// gain[i * N + j] = d y_ij / d xbar_j when everything else is eliminated: column j is gamma B_j^-1 K3 a_.j.
   [[nodiscard]] const AlignedVector& shared_signal_gain() const { return gain_; }
 
  private:
   [[nodiscard]] bool by_modes() const { return players_ <= most_players_by_modes; }
   void find_pattern(const CommunicationGraph& graph);
   void find_modes(const CommunicationGraph& graph);
+  void factor_tiles(Real gamma_k3);
+  void scale_rows(int width, Real* rows) const;
+  [[nodiscard]] Real scale(int i) const { return scale_.empty() ? 1.0 : scale_[at(i)]; }
   [[nodiscard]] BlockPattern pattern() const {
     return {players_,
             elimination_.listed,
@@ -46,14 +53,17 @@ class EstimateBlocks {
 
   int players_ = 0;
   int dimension_ = 0;
-  Real factored_ = 0.0;  // gamma k3, or 0
+  Real k3_ = 0.0;            // of the first player
+  std::vector<Real> scale_;  // S; empty when k3 is the same for all
+  Real factored_ = 0.0;      // gamma k3_, or 0
+  AlignedVector seen_;       // s_i a_ij
   AlignedVector gain_;
   // by elimination
   BlockElimination elimination_;
   std::vector<int> player_;
   std::vector<int> target_;
-  AlignedVector edge_;    // weight of each entry's edge; 0 where elimination fills in
-  AlignedVector degree_;  // sum of each eliminated player's weights
+  AlignedVector edge_;    // s_i a_ik s_k of each entry's edge; 0 where elimination fills in
+  AlignedVector degree_;  // sum of each eliminated player's weights, times s_i^2
   AlignedVector lower_;
   AlignedVector diagonal_;
   // by modes

@@ -50,15 +50,24 @@ Shape read_shape(const TomlEntry& game) {
   return shape;
 }
 
-Gains read_gains(const TomlEntry& gains) {
-  gains.accept_keys({"k1", "k2", "k3", "k4", "beta", "delta", "epsilon"});
-  return {.k1 = gains["k1"].positive(),
-          .k2 = gains["k2"].positive(),
-          .k3 = gains["k3"].positive(),
-          .k4 = gains["k4"].positive(),
-          .beta = gains["beta"].non_negative(),
-          .delta = gains["delta"].non_negative(),
-          .epsilon = gains["epsilon"].positive()};
+void accept_gains(const TomlEntry& gains) {
+  std::vector<std::string_view> keys;
+  for (const GainDeclaration& gain : declared_gains) keys.emplace_back(gain.name);
+  gains.accept_keys(keys);
+}
+
+Real read_gain(const TomlEntry& entry, const GainDeclaration& gain) {
+  return gain.may_be_zero ? entry.non_negative() : entry.positive();
+}
+
+// Those of the game, for all players.
+Gains read_gains(const TomlEntry& table, int players) {
+  accept_gains(table);
+  Gains gains;
+  for (std::size_t k = 0; k < declared_gains.size(); ++k) {
+    (gains.*Gains::members()[k]).assign(at(players), read_gain(table[declared_gains[k].name], declared_gains[k]));
+  }
+  return gains;
 }
 
 Strategy read_strategy(const TomlEntry& strategy) {
@@ -190,7 +199,8 @@ void read_coefficients(const TomlEntry& table, int i, const Shape& shape, Coeffi
   }
 }
 
-constexpr std::string_view player_keys[] = {"name", "order", "x0", "z0", "v0", "y0", "cost", "dynamics", "disturbance"};
+constexpr std::string_view player_keys[] = {"name", "order", "gains", "x0",       "z0",
+                                            "v0",   "y0",    "cost",  "dynamics", "disturbance"};
 
 /// A player's own table before the defaults, key by key.
 class PlayerTable {
@@ -254,6 +264,25 @@ void read_estimates(const TomlEntry& y0, int i, const Shape& shape, InitialState
   for (int j = 0; j < shape.players; ++j) y0.item(at(j)).numbers(shape.dimension, shape.players, estimates + j);
 }
 
+// Those that the player states of its own.
+void read_own_gains(const PlayerTable& player, int i, const Shape& shape, Gains& gains) {
+  const TomlEntry table = player["gains"];
+  accept_gains(table);
+  for (std::size_t k = 0; k < declared_gains.size(); ++k) {
+    const GainDeclaration& gain = declared_gains[k];
+    const TomlEntry entry = table[gain.name];
+    if (!entry.present()) continue;
+    if (gain.order != 0 && gain.order != shape.order[at(i)]) {
+      // a default for players of the other order is none for this one
+      if (!player.has_own("gains")) continue;
+      entry.fail("no " + std::string(gain.name) + " of a player of order " + std::to_string(shape.order[at(i)]) +
+                 ", which has " + (gain.order == 1 ? "k4" : "k1"));
+    }
+    (gains.*Gains::members()[k])[at(i)] = read_gain(entry, gain);
+    gains.per_player = true;
+  }
+}
+
 // Where the search for the equilibrium begins.
 std::vector<Real> read_guess(const TomlEntry& table, const Shape& shape, const InitialState& initial) {
   table.accept_keys({"guess"});
@@ -267,12 +296,12 @@ std::vector<Real> read_guess(const TomlEntry& table, const Shape& shape, const I
 }
 
 // Number of variables when everything is exposed.
-std::int64_t variable_count(const Shape& shape, bool diagonal) {
+std::int64_t variable_count(const Shape& shape, bool diagonal, bool gains_per_player) {
   const std::int64_t N = shape.players;
   const std::int64_t D = shape.dimension;
   const std::int64_t q = shape.neurons;
-  const std::int64_t gains = 7;
-  const std::int64_t network = 2 + (diagonal ? q : 0);  // W_max, rho, center
+  const std::int64_t gains = gains_per_player ? 6 * N : 7;  // k1 or k4, k2, k3, beta, delta, epsilon
+  const std::int64_t network = 2 + (diagonal ? q : 0);      // W_max, rho, center
   const std::int64_t graph_and_cost = N * (N - 1) / 2 + N + N * D + N * (N - 1);
   const std::int64_t dynamics_and_disturbance = N + 4 * N * D;
   const std::int64_t switches = 3;                           // robust, perturbed, allow_disconnected
@@ -285,8 +314,9 @@ std::int64_t variable_count(const Shape& shape, bool diagonal) {
          signals + measures;
 }
 
-Expose read_expose(const TomlEntry& expose, const Shape& shape, bool diagonal) {
-  if (!expose.present()) return variable_count(shape, diagonal) <= most_exposed ? Expose::all : Expose::outputs;
+Expose read_expose(const TomlEntry& expose, const Parameters& parameters) {
+  const std::int64_t variables = variable_count(parameters.shape, parameters.rbf.diagonal, parameters.gains.per_player);
+  if (!expose.present()) return variables <= most_exposed ? Expose::all : Expose::outputs;
   const std::string text = expose.text();
   if (text != "all" && text != "outputs") expose.fail("\"all\" or \"outputs\"");
   return text == "all" ? Expose::all : Expose::outputs;
@@ -350,11 +380,13 @@ Game parse_game(std::string_view toml) {
   const PlayerExpressions none(n, shape.players, n, static_cast<int>(named.values.size()));
   PlayerExpressions dynamics_values = none;
   PlayerExpressions disturbance_values = none;
+  Gains gains = read_gains(game["gains"], shape.players);
   InitialState initial{.x = std::vector<Real>(at(n)),
                        .reference = std::vector<Real>(at(n)),
                        .y = std::vector<Real>(at(shape.players) * at(n))};
   for (int i = 0; i < shape.players; ++i) {
     const PlayerTable& player = players[at(i)];
+    read_own_gains(player, i, shape, gains);
     read_actions(player, i, shape, initial);
     read_coefficients(player["cost"], i, shape, cost.coefficients);
     read_coefficients(player["dynamics"], i, shape, dynamics.coefficients);
@@ -373,7 +405,7 @@ Game parse_game(std::string_view toml) {
             .expose = Expose::all,
             .player_names = names,
             .parameters = {.shape = shape,
-                           .gains = read_gains(game["gains"]),
+                           .gains = std::move(gains),
                            .strategy = read_strategy(game["strategy"]),
                            .rbf = read_network(rbf, shape),
                            .graph = read_graph(game["graph"], shape.players),
@@ -385,7 +417,7 @@ Game parse_game(std::string_view toml) {
                            .initial = std::move(initial),
                            .named = std::move(named)}};
   read.parameters.guess = read_guess(game["equilibrium"], shape, read.parameters.initial);
-  read.expose = read_expose(game["expose"], shape, read.parameters.rbf.diagonal);
+  read.expose = read_expose(game["expose"], read.parameters);
   read.parameters.refresh();
   nash_equilibrium(*read.parameters.cost, shape, read.parameters.guess);  // throws when it is not unique
   return read;

@@ -44,7 +44,7 @@ void LoopJacobian::linearize(const Real* state, const Signals& signals, const Mo
   std::copy_n(state + layout.weights(), weights.size(), weights.begin());
   std::copy(signals.activation.begin(), signals.activation.end(), activation.begin());
   for (std::size_t p = 0; p < slope.size(); ++p) {
-    slope[p] = loop_->robust_term_slope(signals.robust[p]);
+    slope[p] = loop_->robust_term_slope(p, signals.robust[p]);
     inverse_bound[p] = modes[p] != 0 && error[p] * network[p] >= 0.0 ? 1.0 / parameters.rbf.W_max : 0.0;
   }
 }

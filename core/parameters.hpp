@@ -10,19 +10,10 @@
 #include "families/cost.hpp"
 #include "families/disturbance.hpp"
 #include "families/unknown_dynamics.hpp"
+#include "gains.hpp"
 #include "types.hpp"
 
 namespace mixed_order_game {
-
-struct Gains {
-  Real k1 = 0.0;       ///< regulation of first-order players, 1/s
-  Real k2 = 0.0;       ///< gradient step
-  Real k3 = 0.0;       ///< consensus, 1/s
-  Real k4 = 0.0;       ///< velocity feedback of second-order players, 1/s
-  Real beta = 0.0;     ///< adaptation
-  Real delta = 0.0;    ///< amplitude of the robust term
-  Real epsilon = 0.0;  ///< width of the robust term
-};
 
 struct Strategy {
   bool robust = true;     ///< network and robust term in the control (Theorem 1); without them, Theorem 2
@@ -63,7 +54,7 @@ struct Parameters {
   /// The same game with every coefficient and initial value zero, for those of a direction.
   [[nodiscard]] Parameters zero_direction() const {
     Parameters zero = *this;
-    zero.gains = {};
+    for (const auto member : Gains::members()) (zero.gains.*member).assign(at(shape.players), 0.0);
     zero.rbf.width = zero.rbf.W_max = 0.0;
     zero.graph = CommunicationGraph(shape.players);
     for (GameFamily* family : zero.families()) family->coefficients.set_all_to_zero();

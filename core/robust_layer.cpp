@@ -34,31 +34,33 @@ void RobustLayer::find_weights(const LoopJacobian& jacobian, Real gamma, const R
     const Real* weight_of_w = weight + layout.weights_of(m);
     for (std::size_t p = 0; p < columns; ++p) weight_[p] = std::max(weight_[p], activation[p] * weight_of_w[p]);
   }
-  const Real beta = loop_.parameters().gains.beta;
-  for (std::size_t p = 0; p < columns; ++p) weight_[p] = std::max(weight[place_[p]], gamma * beta * weight_[p]);
+  for (std::size_t p = 0; p < columns; ++p) {
+    weight_[p] = std::max(weight[place_[p]], gamma * loop_.gains().beta[p] * weight_[p]);
+  }
 }
 
 bool RobustLayer::linearization_holds(const LoopJacobian& jacobian, const Signals& signals, const Real* state,
                                       Real gamma, const Real* weight, Real tolerance) {
   if (!loop_.parameters().strategy.robust) return true;
-  const Gains& gains = loop_.parameters().gains;
-  if (gains.delta == 0.0) return true;
-  const Real sharpness = robust_term_constant * gains.delta / gains.epsilon;
+  const GainRows& gains = loop_.gains();
+  if (std::all_of(gains.delta.begin(), gains.delta.end(), [](Real delta) { return delta == 0.0; })) return true;
   const std::size_t columns = place_.size();
   loop_.evaluate_errors(state, trial_);
   find_weights(jacobian, gamma, weight);
   const auto change = [&](std::size_t p) { return trial_.error[p] - signals.error[p]; };
-  const auto counted = [&](Real defect) { return defect * (1.0 + weight_of_bends / gains.delta * defect); };
+  const auto counted = [&](std::size_t p, Real defect) {
+    return gains.delta[p] == 0.0 ? 0.0 : defect * (1.0 + weight_of_bends / gains.delta[p] * defect);
+  };
 
   // A bound is nearly always enough, and needs no tanh: Taylor's remainder and the slope's change since the
   // factorization, with |phi''| <= 4 / (3 sqrt 3) delta (K delta / epsilon)^2.
-  const Real largest_curvature = 0.7698003589195010 * gains.delta * sharpness * sharpness;
   Real bound = 0.0;
   for (std::size_t p = 0; p < columns; ++p) {
     const Real size = std::fabs(change(p));
-    const Real slope = loop_.robust_term_slope(signals.robust[p]);
+    const Real largest_curvature = 0.7698003589195010 * gains.delta[p] * gains.sharpness[p] * gains.sharpness[p];
+    const Real slope = loop_.robust_term_slope(p, signals.robust[p]);
     const Real defect = (0.5 * largest_curvature * size + std::fabs(slope - jacobian.slope[p])) * size;
-    bound = std::max(bound, counted(defect) * weight_[p]);
+    bound = std::max(bound, counted(p, defect) * weight_[p]);
   }
   if (gamma * bound <= tolerance) return true;
 
@@ -67,8 +69,8 @@ bool RobustLayer::linearization_holds(const LoopJacobian& jacobian, const Signal
   Real largest = 0.0;
   for (std::size_t p = 0; p < columns; ++p) {
     const Real defect = std::fabs(trial_.robust[p] - (signals.robust[p] + jacobian.slope[p] * change(p)));
-    const Real slope = std::min(loop_.robust_term_slope(trial_.robust[p]), jacobian.slope[p]);
-    largest = std::max(largest, gamma / (1.0 + gamma * slope) * counted(defect) * weight_[p]);
+    const Real slope = std::min(loop_.robust_term_slope(p, trial_.robust[p]), jacobian.slope[p]);
+    largest = std::max(largest, gamma / (1.0 + gamma * slope) * counted(p, defect) * weight_[p]);
   }
   return largest <= tolerance;
 }
@@ -77,12 +79,11 @@ bool RobustLayer::stop_in_the_middle(const Signals& signals, Real* state) {
   if (!loop_.parameters().strategy.robust) return false;
   loop_.evaluate_errors(state, trial_);
   loop_.evaluate_robust_term(trial_);
-  const Real far = 0.5 * loop_.parameters().gains.delta;
   bool stopped = false;
   for (std::size_t p = 0; p < place_.size(); ++p) {
     const Real before = signals.robust[p];
     const Real now = trial_.robust[p];
-    if (!(before * now < 0.0 && std::fabs(now - before) > far)) continue;
+    if (!(before * now < 0.0 && std::fabs(now - before) > 0.5 * loop_.gains().delta[p])) continue;
     state[place_[p]] -= trial_.error[p];
     stopped = true;
   }

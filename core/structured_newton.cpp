@@ -75,7 +75,7 @@ void StructuredNewton::refresh(const LoopJacobian& jacobian) {
   const Parameters& parameters = loop().parameters();
   const Shape& shape = parameters.shape;
   n_ = shape.actions();
-  blocks_.analyse(parameters.graph, shape.dimension);
+  blocks_.analyse(parameters.graph, parameters.gains.k3, shape.dimension);
   player_.resize(at(n_));
   second_.resize(at(n_));
   first_order_.resize(at(n_));
@@ -136,18 +136,18 @@ void StructuredNewton::refresh(const LoopJacobian& jacobian) {
 //     A = gamma beta (|S|^2 - w'S r) / a2.
 void StructuredNewton::factor_weights() {
   const Parameters& parameters = loop().parameters();
-  const Gains& gains = parameters.gains;
+  const GainRows& gains = loop().gains();
   const LoopJacobian& jacobian = *jacobian_;
-  for (int p = 0; p < n_; ++p) stiffness_[at(p)] = (second_[at(p)] != 0 ? gains.k4 : gains.k1) + jacobian.slope[at(p)];
+  for (int p = 0; p < n_; ++p) stiffness_[at(p)] = gains.k[at(p)] + jacobian.slope[at(p)];
   if (!parameters.strategy.robust) return;
 
   const Real* activation = jacobian.activation.data();
   kernels().column_products(n_, parameters.shape.neurons, activation, activation, squares_.data());
-  const Real gamma_beta = gamma_ * gains.beta;
   for (int p = 0; p < n_; ++p) {
     const Real s = jacobian.network[at(p)];
     const Real theta = jacobian.inverse_bound[at(p)];
     const Real r = s * theta;
+    const Real gamma_beta = gamma_ * gains.beta[at(p)];
     const Real push = gamma_beta * jacobian.error[at(p)];
     const Real inverse_a1 = 1.0 / (1.0 + push * r);
     inverse_a1_[at(p)] = inverse_a1;
@@ -167,7 +167,7 @@ void StructuredNewton::factor_weights() {
 //             (1 + gamma B) dx + gamma^2 (B k2 H dy - G dx) = (1 + gamma B) b_x + gamma (b_v - gamma h)
 void StructuredNewton::factor_core() {
   const Parameters& parameters = loop().parameters();
-  const Real k2 = parameters.gains.k2;
+  const AlignedVector& k2 = loop().gains().k2;
   const SparseRows& hessian = parameters.cost->hessian_pattern();
   const SparseRows& dynamics = parameters.dynamics->jacobian_pattern();
   const AlignedVector& gain = blocks_.shared_signal_gain();
@@ -178,7 +178,7 @@ void StructuredNewton::factor_core() {
     inverse_driven_[at(p)] = 1.0 / (1.0 + gamma_ * B);
     const int driven = second ? p : first_order_[at(p)];
     const Real weight = second ? gamma_ * gamma_ : gamma_;
-    const Real gradient_weight = second ? weight * B * k2 : gamma_ * k2;
+    const Real gradient_weight = second ? weight * B * k2[at(p)] : gamma_ * k2[at(p)];
     for (int k = hessian.start[at(p)]; k < hessian.start[at(p + 1)]; ++k) {
       const Real T = gain[at(hessian_gain_[at(k)])];
       core_->add(p, hessian.column[at(k)], gradient_weight * jacobian_->hessian[at(k)] * T);
@@ -207,8 +207,7 @@ bool StructuredNewton::factor(const LoopJacobian& jacobian, Real gamma) {
   jacobian_ = &jacobian;
   gamma_ = gamma;
   factor_weights();
-  const Parameters& parameters = loop().parameters();
-  blocks_.factor(parameters.graph, gamma * parameters.gains.k3);
+  blocks_.factor(gamma);
   factor_core();
   return core_->factor();
 }
@@ -232,7 +231,7 @@ void StructuredNewton::solve(Real* b) {
   const Shape& shape = parameters.shape;
   const StateLayout& layout = loop().layout();
   const bool robust = parameters.strategy.robust;
-  const Real k2 = parameters.gains.k2;
+  const AlignedVector& k2 = loop().gains().k2;
   const SparseRows& dynamics = parameters.dynamics->jacobian_pattern();
   Real* dx = b + layout.x();
   Real* dreference = b + layout.reference();
@@ -262,13 +261,13 @@ void StructuredNewton::solve(Real* b) {
   const bool has_velocities = parameters.dynamics->velocity_pattern().entries() != 0;
   if (has_velocities) std::copy_n(dx, n_, velocity_.begin());
   for (const int p : velocity_driven_) {
-    core_rhs_[at(shared_place_[at(p)])] = dreference[p] - gamma_ * k2 * gradient_[at(p)];
+    core_rhs_[at(shared_place_[at(p)])] = dreference[p] - gamma_ * k2[at(p)] * gradient_[at(p)];
     core_rhs_[at(action_place_[at(p)])] = dx[p] - gamma_ * h[p];
     if (has_velocities) core_rhs_[at(action_place_[at(p)])] -= along_velocities(p, velocity_.data());
   }
   for (const int p : accelerated_) {
     const Real B = stiffness_[at(p)];
-    const Real known = h[p] + B * k2 * gradient_[at(p)];
+    const Real known = h[p] + B * k2[at(p)] * gradient_[at(p)];
     core_rhs_[at(shared_place_[at(p)])] = (1.0 + gamma_ * B) * dx[p] + gamma_ * (dreference[p] - gamma_ * known);
     if (has_velocities) core_rhs_[at(shared_place_[at(p)])] -= gamma_ * along_velocities(p, velocity_.data());
   }
@@ -294,9 +293,9 @@ void StructuredNewton::solve(Real* b) {
       dg += jacobian_->dynamics[at(k)] * dx[dynamics.column[at(k)]];
     }
     if (has_velocities) dg += along_velocities(p, velocity_.data());
-    const Real push = h[p] + stiffness_[at(p)] * k2 * gradient_[at(p)] - dg;
+    const Real push = h[p] + stiffness_[at(p)] * k2[at(p)] * gradient_[at(p)] - dg;
     dreference[p] = (dreference[p] - gamma_ * push) * inverse_driven_[at(p)];
-    error_change_[at(p)] = dreference[p] + k2 * gradient_[at(p)];
+    error_change_[at(p)] = dreference[p] + k2[at(p)] * gradient_[at(p)];
   }
   if (!robust) return;
 

@@ -150,16 +150,16 @@ class Analysis {
   }
 
   LoopNumbers<Dependencies> loop_numbers(const std::vector<KnownCoefficients>& coefficients) const {
-    const auto& [k1, k2, k3, k4, beta, delta, epsilon] = parameters_.gains;
+    const Gains& gains = parameters_.gains;
     const RbfNetwork& rbf = parameters_.rbf;
     LoopNumbers<Dependencies> numbers;
-    numbers.k1 = knowns_.parameter("k1", 0, k1);
-    numbers.k2 = knowns_.parameter("k2", 0, k2);
-    numbers.k3 = knowns_.parameter("k3", 0, k3);
-    numbers.k4 = knowns_.parameter("k4", 0, k4);
-    numbers.beta = knowns_.parameter("beta", 0, beta);
-    numbers.delta = knowns_.parameter("delta", 0, delta);
-    numbers.epsilon = knowns_.parameter("epsilon", 0, epsilon);
+    for (std::size_t k = 0; k < declared_gains.size(); ++k) {
+      const std::vector<Real>& values = gains.*Gains::members()[k];
+      for (int i = 0; i < shape_.players; ++i) {
+        (numbers.gains.*GainsAs<Dependencies>::members()[k])
+            .push_back(knowns_.parameter(declared_gains[k].name, gains.per_player ? i : 0, values[at(i)]));
+      }
+    }
     numbers.robust = knowns_.parameter("robust", 0, 1.0);
     numbers.perturbed = knowns_.parameter("perturbed", 0, 1.0);
     numbers.width = knowns_.parameter("rho", 0, rbf.width);

@@ -10,12 +10,12 @@ void column_products(int n, int rows, const double* a, const double* b, double* 
   });
 }
 
-void weight_rates(int n, int neurons, double beta, const double* e, const double* radial, const double* activation,
-                  const double* weights, double* rate) {
+void weight_rates(int n, int neurons, const double* beta, const double* e, const double* radial,
+                  const double* activation, const double* weights, double* rate) {
   const Index size = static_cast<Index>(neurons) * n;
   for_columns(n, [=](auto width, Index p) {
     using Width = decltype(width);
-    const Width push = beta * load_as<Width>(e + p);
+    const Width push = load_as<Width>(beta + p) * load_as<Width>(e + p);
     const Width r = load_as<Width>(radial + p);
     for (Index k = p; k < size; k += n) {
       store(push * (load_as<Width>(activation + k) - r * load_as<Width>(weights + k)), rate + k);

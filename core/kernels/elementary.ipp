@@ -75,8 +75,10 @@ inline Vector tanh_of(const Vector& a) {
   return vector_of(bits_of(magnitude) | sign);
 }
 
-void scaled_tanh(int n, double amplitude, double sharpness, const double* a, double* out) {
-  for_each_vector(n, a, out, [&](const Vector& e) { return amplitude * tanh_of(sharpness * e); });
+void scaled_tanh(int n, const double* amplitude, const double* sharpness, const double* a, double* out) {
+  for (int k = 0; k < n; ++k) out[k] = sharpness[k] * a[k];
+  for_each_vector(n, out, out, tanh_of);
+  for (int k = 0; k < n; ++k) out[k] = amplitude[k] * out[k];
 }
 
 // Cody-Waite reduction by pi / 2 and the minimax polynomials of FreeBSD's msun; exact enough for |a| below 1e5.

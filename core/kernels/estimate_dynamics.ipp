@@ -1,8 +1,9 @@
-// y_ij' = -k3 (sum_k a_ik (y_ij - y_kj) + a_ij (y_ij - xbar_j)); part of level.cpp.
+// y_ij' = -k3_i (sum_k a_ik (y_ij - y_kj) + a_ij (y_ij - xbar_j)); part of level.cpp.
 
-/// -k3 sum_k a_ik (y_ij - y_kj) of player i, for as many columns from p on as `count` vectors hold.
+/// -k3_i sum_k a_ik (y_ij - y_kj) of player i, for as many columns from p on as `count` vectors hold.
 template <typename Width, int count>
-inline void consensus_rates(NeighbourRows graph, int i, Index n, double k3, const double* y, double* rate, Index p) {
+inline void consensus_rates(NeighbourRows graph, int i, Index n, const double* k3, const double* y, double* rate,
+                            Index p) {
   Width mine[count];
   Width sum[count];
   for (int c = 0; c < count; ++c) {
@@ -14,11 +15,12 @@ inline void consensus_rates(NeighbourRows graph, int i, Index n, double k3, cons
     for (int c = 0; c < count; ++c)
       sum[c] += graph.weight[e] * (mine[c] - load_as<Width>(other + c * length_of<Width>));
   }
-  for (int c = 0; c < count; ++c) store(-k3 * sum[c], rate + i * n + p + c * length_of<Width>);
+  const double gain = -k3[i];
+  for (int c = 0; c < count; ++c) store(gain * sum[c], rate + i * n + p + c * length_of<Width>);
 }
 
-void estimate_rates(int players, int dimension, NeighbourRows graph, double k3, const double* y, const double* xbar,
-                    double* rate) {
+void estimate_rates(int players, int dimension, NeighbourRows graph, const double* k3, const double* y,
+                    const double* xbar, double* rate) {
   constexpr int at_once = 4;  // sums that do not wait for each other
   constexpr Index strip = at_once * vector_length;
   const Index n = static_cast<Index>(players) * dimension;
@@ -34,7 +36,7 @@ void estimate_rates(int players, int dimension, NeighbourRows graph, double k3, 
     const double* own = y + i * n;
     double* out = rate + i * n;
     for (int e = graph.start[i]; e < graph.start[i + 1]; ++e) {
-      const double gain = -k3 * graph.weight[e];
+      const double gain = -k3[i] * graph.weight[e];
       for (Index j = graph.neighbour[e]; j < n; j += players) out[j] += gain * (own[j] - xbar[j]);
     }
   }

@@ -48,7 +48,7 @@ struct Kernels {
   // elementary functions: out may be the input
   void (*exponential)(int n, const double* a, double* out);
   /// out = amplitude * tanh(sharpness * a)
-  void (*scaled_tanh)(int n, double amplitude, double sharpness, const double* a, double* out);
+  void (*scaled_tanh)(int n, const double* amplitude, const double* sharpness, const double* a, double* out);
   /// d = bias + amplitude * sin(frequency * t + phase)
   void (*sinusoid)(int n, double t, const double* amplitude, const double* frequency, const double* phase,
                    const double* bias, double* d);
@@ -61,14 +61,14 @@ struct Kernels {
   /// The same for centres that are vectors: center m is the row centers + m * n.
   void (*activations_general)(int players, int dimension, int neurons, const double* centers, double width,
                               const double* y, double* exponent, double* activation);
-  /// y_ij' = -k3 (sum_k a_ik (y_ij - y_kj) + a_ij (y_ij - xbar_j))
-  void (*estimate_rates)(int players, int dimension, NeighbourRows graph, double k3, const double* y,
+  /// y_ij' = -k3_i (sum_k a_ik (y_ij - y_kj) + a_ij (y_ij - xbar_j))
+  void (*estimate_rates)(int players, int dimension, NeighbourRows graph, const double* k3, const double* y,
                          const double* xbar, double* rate);
   /// sum[p] = sum over m of a[m * n + p] * b[m * n + p]
   void (*column_products)(int n, int rows, const double* a, const double* b, double* sum);
   /// W' = beta e (S - radial W), row by row; radial[p] is 0 inside and w'S / W_max on the sphere.
-  void (*weight_rates)(int n, int neurons, double beta, const double* e, const double* radial, const double* activation,
-                       const double* weights, double* rate);
+  void (*weight_rates)(int n, int neurons, const double* beta, const double* e, const double* radial,
+                       const double* activation, const double* weights, double* rate);
   double (*dot)(int n, const double* a, const double* b);
 
   /// Runs the code of a tape over rows of lanes, a whole number of vectors each; row k begins at rows + k * lanes.

@@ -88,7 +88,7 @@ void run_tape(int count, const TapeInstruction* code, int lanes, double* rows) {
         each([](double x, double) { return cosh(x); });
         break;
       case Operation::tanh:
-        scaled_tanh(lanes, 1.0, 1.0, a, out);
+        for_each_vector(lanes, a, out, tanh_of);
         break;
       case Operation::erf:
         each([](double x, double) { return erf(x); });

@@ -14,7 +14,7 @@ struct LoopNumbers {
     Scalar weight;
   };
 
-  Scalar k1, k2, k3, k4, beta, delta, epsilon;
+  GainsAs<Scalar> gains;
   Scalar robust, perturbed;
   Scalar width, W_max;
   std::vector<Scalar> centers;           ///< as in RbfNetwork
@@ -62,6 +62,7 @@ class LoopEquations {
 template <typename Scalar>
 void LoopEquations<Scalar>::evaluate_control(const LoopNumbers<Scalar>& number, const Scalar* state) {
   const Shape& shape = parameters_.shape;
+  const GainsAs<Scalar>& gains = number.gains;
   const int n = shape.actions();
   const Scalar* y = state + layout.estimates();
   parameters_.cost->own_gradients(*number.cost, y, n, gradient.data());
@@ -79,14 +80,15 @@ void LoopEquations<Scalar>::evaluate_control(const LoopNumbers<Scalar>& number, 
     const Scalar& x = state[layout.x() + p];
     const Scalar& reference = state[layout.reference() + p];
     shared[at(p)] = terms::shared_signal(second, x, reference);
-    error[at(p)] = terms::error(second, x, reference, number.k2, gradient[at(p)]);
+    error[at(p)] = terms::error(second, x, reference, gains.k2[at(i)], gradient[at(p)]);
     Scalar sum = 0.0;
     for (int m = 0; m < shape.neurons; ++m) {
       sum += state[layout.weights_of(m) + p] * activation[at(m * shape.players + i)];
     }
     network[at(p)] = number.robust * sum;
-    robust[at(p)] = number.robust * terms::robust_term(number.delta, number.epsilon, error[at(p)]);
-    control[at(p)] = terms::control(second ? number.k4 : number.k1, error[at(p)], network[at(p)], robust[at(p)]);
+    robust[at(p)] = number.robust * terms::robust_term(gains.delta[at(i)], gains.epsilon[at(i)], error[at(p)]);
+    control[at(p)] =
+        terms::control(second ? gains.k4[at(i)] : gains.k1[at(i)], error[at(p)], network[at(p)], robust[at(p)]);
   }
 }
 
@@ -94,6 +96,7 @@ template <typename Scalar>
 void LoopEquations<Scalar>::evaluate_rates(const LoopNumbers<Scalar>& number, const Scalar& t, const Scalar* state,
                                            const Scalar* d_ext, const Modes& modes, Scalar* rate) {
   const Shape& shape = parameters_.shape;
+  const GainsAs<Scalar>& gains = number.gains;
   const int n = shape.actions();
   parameters_.dynamics->values(*number.dynamics, state + layout.x(), state + layout.reference(), dynamics.data());
   parameters_.disturbance->values(*number.disturbance, t, disturbance.data());
@@ -103,17 +106,17 @@ void LoopEquations<Scalar>::evaluate_rates(const LoopNumbers<Scalar>& number, co
     // x' or v' = u + g + d
     const Scalar driven = control[at(p)] + number.perturbed * (dynamics[at(p)] + disturbance[at(p)]) + d_ext[p];
     rate[layout.x() + p] = second ? state[layout.reference() + p] : driven;
-    rate[layout.reference() + p] = second ? driven : terms::reference_rate(number.k2, gradient[at(p)]);
+    rate[layout.reference() + p] = second ? driven : terms::reference_rate(gains.k2[at(i)], gradient[at(p)]);
 
     const bool on_sphere = modes[at(p)] != 0 && is_outward(error[at(p)], network[at(p)]);
     const Scalar r = on_sphere ? network[at(p)] / number.W_max : Scalar(0.0);
     for (int m = 0; m < shape.neurons; ++m) {
       const int w = layout.weights_of(m) + p;
       rate[w] = number.robust *
-                terms::weight_rate(number.beta, error[at(p)], activation[at(m * shape.players + i)], r, state[w]);
+                terms::weight_rate(gains.beta[at(i)], error[at(p)], activation[at(m * shape.players + i)], r, state[w]);
     }
   }
-  // y_ij' = -k3 (sum_k a_ik (y_ij - y_kj) + a_ij (y_ij - xbar_j))
+  // y_ij' = -k3_i (sum_k a_ik (y_ij - y_kj) + a_ij (y_ij - xbar_j))
   for (int i = 0; i < shape.players; ++i) {
     const Scalar* own = state + layout.estimates_of(i);
     Scalar* own_rate = rate + layout.estimates_of(i);
@@ -123,7 +126,7 @@ void LoopEquations<Scalar>::evaluate_rates(const LoopNumbers<Scalar>& number, co
         sum += weight * (own[p] - state[layout.estimates_of(k) + p]);
         if (k == shape.player_of(p)) sum += weight * (own[p] - shared[at(p)]);
       }
-      own_rate[p] = -number.k3 * sum;
+      own_rate[p] = -gains.k3[at(i)] * sum;
     }
   }
 }

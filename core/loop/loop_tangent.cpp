@@ -14,6 +14,7 @@ LoopTangent::LoopTangent(const ClosedLoop& loop)
       state_(state.size()),
       d_ext_(d_ext.size()),
       rate_(state.size()) {
+  for (const auto member : GainsAs<Dual>::members()) (numbers_.gains.*member).resize(at(loop.shape().players));
   numbers_.centers.resize(loop.parameters().rbf.centers.size());
   const NeighbourRows neighbours = loop.parameters().graph.neighbours();
   for (int i = 0; i < loop.shape().players; ++i) {
@@ -39,13 +40,13 @@ void LoopTangent::evaluate(const Parameters* direction, Real t, const Real* at_s
   const auto with = [&](auto part, auto member) {
     return Dual((parameters.*part).*member, direction == nullptr ? 0.0 : (direction->*part).*member);
   };
-  numbers_.k1 = with(&Parameters::gains, &Gains::k1);
-  numbers_.k2 = with(&Parameters::gains, &Gains::k2);
-  numbers_.k3 = with(&Parameters::gains, &Gains::k3);
-  numbers_.k4 = with(&Parameters::gains, &Gains::k4);
-  numbers_.beta = with(&Parameters::gains, &Gains::beta);
-  numbers_.delta = with(&Parameters::gains, &Gains::delta);
-  numbers_.epsilon = with(&Parameters::gains, &Gains::epsilon);
+  for (std::size_t k = 0; k < declared_gains.size(); ++k) {
+    std::vector<Dual>& gains = numbers_.gains.*GainsAs<Dual>::members()[k];
+    const auto own = Gains::members()[k];
+    for (std::size_t i = 0; i < gains.size(); ++i) {
+      gains[i] = {(parameters.gains.*own)[i], direction == nullptr ? 0.0 : (direction->gains.*own)[i]};
+    }
+  }
   numbers_.robust = parameters.strategy.robust ? 1.0 : 0.0;
   numbers_.perturbed = parameters.strategy.perturbed ? 1.0 : 0.0;
   numbers_.width = with(&Parameters::rbf, &RbfNetwork::width);

@@ -33,14 +33,6 @@ constexpr Unit known_units[] = {{"1", 0, 0},     {"s", 1, 0},     {"1/s", -1, 0}
 
 // Accessors made from members, so that reading and setting name the same one.
 template <auto Member>
-Real read_gain(const View& view, int) {
-  return view.settings->parameters.gains.*Member;
-}
-template <auto Member>
-void write_gain(Settings& settings, int, Real value) {
-  settings.parameters.gains.*Member = value;
-}
-template <auto Member>
 Real read_initial(const View& view, int slot) {
   return (view.settings->parameters.initial.*Member)[at(slot)];
 }
@@ -123,9 +115,12 @@ class ModelVariables::Builder {
  private:
   static Elements one() { return {{0, {}}}; }
 
-  Elements players() const {
+  // [i] for players of an order; 0: for all
+  Elements players(int order = 0) const {
     Elements elements;
-    for (int i = 0; i < shape_.players; ++i) elements.push_back({i, {i + 1}});
+    for (int i = 0; i < shape_.players; ++i) {
+      if (order == 0 || shape_.order[at(i)] == order) elements.push_back({i, {i + 1}});
+    }
     return elements;
   }
   // [i,l] for players of an order; 0: for all
@@ -181,16 +176,6 @@ class ModelVariables::Builder {
     family.variability = variability;
     family.initial = Initial::exact;
     return family;
-  }
-  template <auto Member>
-  void add_gain(const char* name, const char* description, const char* unit, Range range) {
-    Family family = parameter(name, description, Variability::tunable);
-    family.declared_type = "Gain";
-    family.unit = {unit, unit};
-    family.range = range;
-    family.read = read_gain<Member>;
-    family.write = write_gain<Member>;
-    add(std::move(family), one());
   }
   // What the families of the game declare.
   void add_coefficients() {
@@ -291,13 +276,25 @@ class ModelVariables::Builder {
   }
 
   void add_gains() {
-    add_gain<&Gains::k1>("k1", "Regulation gain of players of order 1", "1/s", Range::positive);
-    add_gain<&Gains::k2>("k2", "Gradient gain", "1/s", Range::positive);
-    add_gain<&Gains::k3>("k3", "Consensus gain of the estimates", "1/s", Range::positive);
-    add_gain<&Gains::k4>("k4", "Velocity feedback gain of players of order 2", "1/s", Range::positive);
-    add_gain<&Gains::beta>("beta", "Adaptation gain of the network weights", "1/s2", Range::non_negative);
-    add_gain<&Gains::delta>("delta", "Amplitude of the robust term", nullptr, Range::non_negative);
-    add_gain<&Gains::epsilon>("epsilon", "Width of the robust term", nullptr, Range::positive);
+    const bool per_player = game_.parameters.gains.per_player;
+    for (std::size_t k = 0; k < declared_gains.size(); ++k) {
+      const GainDeclaration& gain = declared_gains[k];
+      const auto values = Gains::members()[k];
+      Family family = parameter(gain.name, gain.description, Variability::tunable);
+      family.declared_type = "Gain";
+      family.unit = {gain.unit, gain.unit};
+      family.range = gain.may_be_zero ? Range::non_negative : Range::positive;
+      family.read = [=](const View& view, int i) { return (view.settings->parameters.gains.*values)[at(i)]; };
+      family.write = [=](Settings& settings, int i, Real value) {
+        std::vector<Real>& gains = settings.parameters.gains.*values;
+        if (per_player) {
+          gains[at(i)] = value;
+        } else {
+          std::fill(gains.begin(), gains.end(), value);
+        }
+      };
+      add(std::move(family), per_player ? players(gain.order) : one());
+    }
   }
 
   void add_network() {

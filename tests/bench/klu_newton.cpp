@@ -22,6 +22,7 @@ void for_each_term(const LoopJacobian& jacobian, Term term) {
   const Shape& shape = loop.shape();
   const StateLayout& layout = loop.layout();
   const Gains& gains = parameters.gains;
+  const GainRows& rows = loop.gains();
   const SparseRows& hessian_rows = parameters.cost->hessian_pattern();
   const SparseRows& dynamics_rows = parameters.dynamics->jacobian_pattern();
   const NeighbourRows graph = parameters.graph.neighbours();
@@ -40,7 +41,7 @@ void for_each_term(const LoopJacobian& jacobian, Term term) {
       }
       term(row, layout.reference() + p, scale);
       for (int k = hessian_rows.start[at(p)]; k < hessian_rows.start[at(p + 1)]; ++k) {
-        term(row, own + hessian_rows.column[at(k)], scale * gains.k2 * jacobian.hessian[at(k)]);
+        term(row, own + hessian_rows.column[at(k)], scale * rows.k2[at(p)] * jacobian.hessian[at(k)]);
       }
     };
     const int driven = second ? layout.reference() + p : layout.x() + p;
@@ -48,10 +49,10 @@ void for_each_term(const LoopJacobian& jacobian, Term term) {
       term(layout.x() + p, layout.reference() + p, 1.0);
     } else {
       for (int k = hessian_rows.start[at(p)]; k < hessian_rows.start[at(p + 1)]; ++k) {
-        term(layout.reference() + p, own + hessian_rows.column[at(k)], -gains.k2 * jacobian.hessian[at(k)]);
+        term(layout.reference() + p, own + hessian_rows.column[at(k)], -rows.k2[at(p)] * jacobian.hessian[at(k)]);
       }
     }
-    error(driven, -((second ? gains.k4 : gains.k1) + jacobian.slope[at(p)]));
+    error(driven, -(rows.k[at(p)] + jacobian.slope[at(p)]));
     for (int k = dynamics_rows.start[at(p)]; k < dynamics_rows.start[at(p + 1)]; ++k) {
       term(driven, layout.x() + dynamics_rows.column[at(k)], jacobian.dynamics[at(k)]);
     }
@@ -60,12 +61,12 @@ void for_each_term(const LoopJacobian& jacobian, Term term) {
     for (int m = 0; m < q; ++m) term(driven, layout.weights_of(m) + p, -jacobian.activation[at(m * n + p)]);
     const Real theta = jacobian.inverse_bound[at(p)];
     const Real r = jacobian.network[at(p)] * theta;
-    const Real push = gains.beta * jacobian.error[at(p)];
+    const Real push = rows.beta[at(p)] * jacobian.error[at(p)];
     for (int m = 0; m < q; ++m) {
       const int row = layout.weights_of(m) + p;
       const Real w = jacobian.weights[at(m * n + p)];
       const Real S = jacobian.activation[at(m * n + p)];
-      error(row, gains.beta * (S - r * w));
+      error(row, rows.beta[at(p)] * (S - r * w));
       if (theta != 0.0) {
         const Real onto_weight = push * w * theta;
         for (int h = 0; h < q; ++h) {
@@ -79,12 +80,13 @@ void for_each_term(const LoopJacobian& jacobian, Term term) {
     for (int k = 0; k < n; ++k) {
       const int j = shape.player_of(k);
       const int row = layout.estimates_of(i) + k;
-      Real own = -gains.k3 * parameters.graph.weight(i, j);
+      Real own = -gains.k3[at(i)] * parameters.graph.weight(i, j);
       for (int edge = graph.start[i]; edge < graph.start[i + 1]; ++edge) {
-        own -= gains.k3 * graph.weight[edge];
-        term(row, layout.estimates_of(graph.neighbour[edge]) + k, gains.k3 * graph.weight[edge]);
+        own -= gains.k3[at(i)] * graph.weight[edge];
+        term(row, layout.estimates_of(graph.neighbour[edge]) + k, gains.k3[at(i)] * graph.weight[edge]);
         if (graph.neighbour[edge] == j) {
-          term(row, (shape.is_second_order(j) ? layout.x() : layout.reference()) + k, gains.k3 * graph.weight[edge]);
+          term(row, (shape.is_second_order(j) ? layout.x() : layout.reference()) + k,
+               gains.k3[at(i)] * graph.weight[edge]);
         }
       }
       term(row, row, own);

@@ -132,7 +132,7 @@ TEST_P(ClosedLoopOfRandomGame, OnTheSphereTheNormNeverGrows) {
         size += std::abs(state.W[i][m][l] * rates.W[i][m][l]);
       }
       const std::size_t p = l * game_.players + i;
-      const Real inward = std::min(0.0, 2.0 * game_.beta * signals.error[p] * signals.network[p]);
+      const Real inward = std::min(0.0, 2.0 * game_.beta[i] * signals.error[p] * signals.network[p]);
       EXPECT_NEAR(growth, inward, 1e-12 * size + 1e-10 * game_.W_max) << i << ' ' << l;
     }
   }
@@ -170,7 +170,7 @@ TEST_P(ClosedLoopOfRandomGame, EventFunctionsBelongToTheirStateWhateverTheSignal
   loop_.event_functions(state.flat().data(), modes, tolerance, signals, values.data());
   for (std::size_t p = 0; p < modes.size(); ++p) {
     const Real height = norm2[p] / game_.W_max - 1.0;
-    const Real falling = -2.0 * game_.beta * error[p] * network[p] / game_.W_max;
+    const Real falling = -2.0 * game_.beta[p % game_.players] * error[p] * network[p] / game_.W_max;
     const Real value = modes[p] != 0 ? std::min(-tolerance - height, falling) : height;
     EXPECT_NEAR(values[p], value, 2e-12 * (1.0 + std::abs(value))) << "column " << p;
   }

@@ -87,13 +87,13 @@ TEST(GameDefinition, NumbersLandWhereTheCoreExpectsThem) {
   EXPECT_EQ(game.player_names, (std::vector<std::string>{"first", "second", "third"}));
   Parameters& p = game.parameters;
   EXPECT_EQ(p.shape, (Shape{.players = 3, .dimension = 2, .neurons = 4, .order = {1, 2, 1}}));
-  EXPECT_EQ(p.gains.k1, 10.0);
-  EXPECT_EQ(p.gains.k2, 1.0);
-  EXPECT_EQ(p.gains.k3, 50.0);
-  EXPECT_EQ(p.gains.k4, 20.0);
-  EXPECT_EQ(p.gains.beta, 100.0);
-  EXPECT_EQ(p.gains.delta, 0.0);
-  EXPECT_EQ(p.gains.epsilon, 0.01);
+  EXPECT_EQ(p.gains.k1, std::vector<Real>(3, 10.0));
+  EXPECT_EQ(p.gains.k2, std::vector<Real>(3, 1.0));
+  EXPECT_EQ(p.gains.k3, std::vector<Real>(3, 50.0));
+  EXPECT_EQ(p.gains.k4, std::vector<Real>(3, 20.0));
+  EXPECT_EQ(p.gains.beta, std::vector<Real>(3, 100.0));
+  EXPECT_EQ(p.gains.delta, std::vector<Real>(3, 0.0));
+  EXPECT_EQ(p.gains.epsilon, std::vector<Real>(3, 0.01));
   EXPECT_TRUE(p.strategy.robust);
   EXPECT_TRUE(p.strategy.perturbed);
   EXPECT_TRUE(p.rbf.diagonal);
@@ -129,6 +129,23 @@ TEST(GameDefinition, NumbersLandWhereTheCoreExpectsThem) {
   std::vector<Real> g(6);
   dynamics.values(std::vector<Real>{1.0, 2.0, 3.0, 4.0, 5.0, 6.0}.data(), nullptr, g.data());
   EXPECT_EQ(g, (std::vector<Real>{0.0, 1.5 * 1.0 + 2.0 * 3.0, 0.0, 0.0, -0.25 * 16.0 + 2.0 * 6.0, 0.0}));
+}
+
+TEST(GameDefinition, PlayersHaveGainsOfTheirOwn) {
+  const Gains own = parse_game(edited("v0 = -1", "v0 = -1\ngains = { k4 = 25.0, delta = 3 }")).parameters.gains;
+  EXPECT_TRUE(own.per_player);
+  EXPECT_FALSE(parse_game(three_players).parameters.gains.per_player);
+  EXPECT_EQ(own.k4, (std::vector<Real>{20.0, 25.0, 20.0}));
+  EXPECT_EQ(own.delta, (std::vector<Real>{0.0, 3.0, 0.0}));
+  EXPECT_EQ(own.k3, std::vector<Real>(3, 50.0));
+  // of the defaults' table a player takes what its order has; its own table replaces that one
+  std::string text = edited("v0 = -1", "v0 = -1\ngains = { k3 = 7.0 }");
+  text.insert(text.find("[[player]]"), "[defaults]\ngains = { k1 = 2.0, k4 = 3.0, k2 = 4.0 }\n");
+  const Gains mixed = parse_game(text).parameters.gains;
+  EXPECT_EQ(mixed.k1, (std::vector<Real>{2.0, 10.0, 2.0}));
+  EXPECT_EQ(mixed.k4, std::vector<Real>(3, 20.0));
+  EXPECT_EQ(mixed.k2, (std::vector<Real>{4.0, 1.0, 4.0}));
+  EXPECT_EQ(mixed.k3, (std::vector<Real>{50.0, 7.0, 50.0}));
 }
 
 TEST(GameDefinition, TermsOfBothKindsAreMerged) {
@@ -433,6 +450,11 @@ const Refusal relations[] = {
      "player[2].dynamics.linear[2] is [1, 2], expected each player once, and player 1 comes twice"},
     {"square = [[1, [0.0, -0.25]]]", "square = [[1, 0.5], [1, 0.5]]",
      "player[2].dynamics.square[2] is [1, 0.5], expected each player once, and player 1 comes twice"},
+    {"v0 = -1", "gains = { k1 = 3.0 }", "player[2].gains.k1 is 3, expected no k1 of a player of order 2, which has k4"},
+    {"v0 = -1", "gains = { k3 = 0 }", "player[2].gains.k3 is 0, expected a positive number"},
+    {"v0 = -1", "gains = { kappa = 1 }",
+     "\"kappa\" is an unknown key of player[2].gains, expected one of k1, k2, k3, k4, beta, delta, epsilon"},
+    {"v0 = -1", "gains = 3.0", "player[2].gains is 3, expected a table"},
     {"v0 = -1", "z0 = -1", "player[2].z0 is -1, expected no z0 for a player of order 2, which has v0"},
     {"z0 = [0.1, 0.2]", "v0 = [0.1, 0.2]",
      "player[1].v0 is [0.1, 0.2], expected no v0 for a player of order 1, which has z0"},

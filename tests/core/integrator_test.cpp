@@ -228,13 +228,13 @@ TEST(Integrator, DoesNotChatterOnGrazingColumns) {
 TEST(Integrator, SlidesWithARobustTermAsSteepAsTheTheoremsAskFor) {
   Game game = parse_game(text_of(paper_game));
   Gains& gains = game.parameters.gains;
-  gains.k1 = 9.7e4;
-  gains.k2 = 54.0;
-  gains.k3 = 3.4e6;
-  gains.k4 = 3.3e14;
-  gains.beta = 2e6;
-  gains.delta = 3.3e6;
-  gains.epsilon = 0.004;
+  gains.k1.assign(5, 9.7e4);
+  gains.k2.assign(5, 54.0);
+  gains.k3.assign(5, 3.4e6);
+  gains.k4.assign(5, 3.3e14);
+  gains.beta.assign(5, 2e6);
+  gains.delta.assign(5, 3.3e6);
+  gains.epsilon.assign(5, 0.004);
   const ClosedLoop loop(game.parameters);
   const std::size_t n = at(loop.shape().actions());
   std::vector<Real> state(at(loop.layout().size()));
@@ -251,7 +251,7 @@ TEST(Integrator, SlidesWithARobustTermAsSteepAsTheTheoremsAskFor) {
       std::vector<Real> point = play;
       for (std::size_t p = 0; p < n; ++p) point[p] += reach * h * slope[p];
       loop.parameters().cost->own_gradients(point.data(), 0, slope.data());
-      for (Real& number : slope) number *= -gains.k2;
+      for (Real& number : slope) number *= -gains.k2[0];
       for (std::size_t p = 0; p < n; ++p) sum[p] += share / 6.0 * slope[p];
     }
     for (std::size_t p = 0; p < n; ++p) play[p] += h * sum[p];

@@ -94,7 +94,8 @@ Array exponentials(const Array& a) {
 Array tanhs(const Array& a) {
   return on_every_level([&](const Kernels& kernel) {
     Array out(a.size());
-    kernel.scaled_tanh(a.size(), 1.0, 1.0, a, out);
+    const Array one(a.size(), 1.0);
+    kernel.scaled_tanh(a.size(), one, one, a, out);
     return out;
   });
 }
@@ -172,13 +173,13 @@ TEST(ScaledTanh, OfSpecialNumbers) {
 TEST(ScaledTanh, ScalesItsArgumentAndItsValue) {
   RandomNumbers random(3);
   for (const int n : sizes) {
-    const Array a(n, random);
+    const Array a(n, random), amplitude(n, random), sharpness(n, random);
     const Array computed = on_every_level([&](const Kernels& kernel) {
       Array out(a);  // in place
-      kernel.scaled_tanh(n, 10.0, 1.5, out, out);
+      kernel.scaled_tanh(n, amplitude, sharpness, out, out);
       return out;
     });
-    for (int k = 0; k < n; ++k) EXPECT_NEAR(computed[k], 10.0 * std::tanh(1.5 * a[k]), 1e-14);
+    for (int k = 0; k < n; ++k) EXPECT_NEAR(computed[k], amplitude[k] * std::tanh(sharpness[k] * a[k]), 1e-14);
   }
 }
 
@@ -364,10 +365,10 @@ TEST(EstimateRates, AreTheConsensusLaw) {
     const int n = players * dimension;
     const Ring ring(players, random);
     const Array y(players * n, random);
-    const Array xbar(n, random);
+    const Array xbar(n, random), k3(players, random);
     const Array computed = on_every_level([&](const Kernels& kernel) {
       Array rate(players * n, 9.0);
-      kernel.estimate_rates(players, dimension, ring.rows(), 50.0, y, xbar, rate);
+      kernel.estimate_rates(players, dimension, ring.rows(), k3, y, xbar, rate);
       return rate;
     });
     for (int i = 0; i < players; ++i) {
@@ -377,7 +378,7 @@ TEST(EstimateRates, AreTheConsensusLaw) {
           expected += ring.dense[static_cast<std::size_t>(i * players + k)] * (y[i * n + p] - y[k * n + p]);
         }
         expected += ring.dense[static_cast<std::size_t>(i * players + p % players)] * (y[i * n + p] - xbar[p]);
-        EXPECT_NEAR(computed[i * n + p], -50.0 * expected, 1e-12);
+        EXPECT_NEAR(computed[i * n + p], -k3[i] * expected, 1e-12);
       }
     }
   }
@@ -388,7 +389,7 @@ TEST(Columns, FollowTheirFormulas) {
   for (const int n : sizes) {
     constexpr int rows = 6;
     const Array S(rows * n, random), w(rows * n, random);
-    const Array e(n, random), r(n, random), scale(n, random), onto_weight(n, random);
+    const Array e(n, random), r(n, random), scale(n, random), beta(n, random), onto_weight(n, random);
 
     const Array products = on_every_level([&](const Kernels& kernel) {
       Array sum(n, 9.0);
@@ -397,7 +398,7 @@ TEST(Columns, FollowTheirFormulas) {
     });
     const Array rates = on_every_level([&](const Kernels& kernel) {
       Array rate(rows * n);
-      kernel.weight_rates(n, rows, 30.0, e, r, S, w, rate);
+      kernel.weight_rates(n, rows, beta, e, r, S, w, rate);
       return rate;
     });
     const Array corrected = on_every_level([&](const Kernels& kernel) {
@@ -410,7 +411,7 @@ TEST(Columns, FollowTheirFormulas) {
       for (int m = 0; m < rows; ++m) {
         const int k = m * n + p;
         product += w[k] * S[k];
-        EXPECT_NEAR(rates[k], 30.0 * e[p] * (S[k] - r[p] * w[k]), 1e-12);
+        EXPECT_NEAR(rates[k], beta[p] * e[p] * (S[k] - r[p] * w[k]), 1e-12);
         EXPECT_NEAR(corrected[k], scale[p] * S[k] + e[p] * S[k] + onto_weight[p] * w[k], 1e-14);
       }
       EXPECT_NEAR(products[p], product, 1e-14);

@@ -109,7 +109,7 @@ TEST(LoopJacobian, FollowsChangedParametersAfterRefresh) {
   ClosedLoop loop(parse_game(toml_of(game)).parameters);
   LoopJacobian jacobian(loop);
   RandomNumbers random(9);
-  game.k2 *= 2.0;
+  game.k2[1] *= 2.0;
   game.coupling[0][1] = game.coupling[0][1] == 0.0 ? 0.7 : 0.0;
   game.adjacency[0][1] = game.adjacency[1][0] = game.adjacency[0][1] == 0.0 ? 1.3 : 0.2;
   loop.parameters().gains.k2 = game.k2;
@@ -123,7 +123,7 @@ TEST(LoopJacobian, FollowsChangedParametersAfterRefresh) {
 
 TEST(LoopJacobian, OfAnAmplitudeOfZeroHasNoRobustTerm) {
   PlainGame game = random_game({.seed = 41, .players = 2, .dimension = 3, .neurons = 4, .order = {2, 1}});
-  game.delta = 0.0;
+  game.delta = testing::everyone(game, 0.0);
   const ClosedLoop loop(parse_game(toml_of(game)).parameters);
   LoopJacobian jacobian(loop);
   RandomNumbers random(10);

@@ -9,7 +9,7 @@ std::vector<MatrixEntry> matrix_of(const LoopJacobian& jacobian) {
   const Parameters& parameters = jacobian.loop().parameters();
   const Shape& shape = jacobian.loop().shape();
   const StateLayout& layout = jacobian.loop().layout();
-  const Gains& gains = parameters.gains;
+  const GainRows& gains = jacobian.loop().gains();
   const int n = shape.actions();
   const SparseRows& hessian_rows = parameters.cost->hessian_pattern();
   const SparseRows& dynamics_rows = parameters.dynamics->jacobian_pattern();
@@ -37,7 +37,7 @@ std::vector<MatrixEntry> matrix_of(const LoopJacobian& jacobian) {
     if (shape.is_second_order(i)) {
       add(layout.reference() + p, scale);
       for (int k = hessian_rows.start[at(p)]; k < hessian_rows.start[at(p + 1)]; ++k) {
-        add(layout.estimates_of(i) + hessian_rows.column[at(k)], scale * gains.k2 * jacobian.hessian[at(k)]);
+        add(layout.estimates_of(i) + hessian_rows.column[at(k)], scale * gains.k2[at(p)] * jacobian.hessian[at(k)]);
       }
     } else {
       add(layout.x() + p, scale);
@@ -48,7 +48,7 @@ std::vector<MatrixEntry> matrix_of(const LoopJacobian& jacobian) {
     for (int m = 0; m < shape.neurons; ++m) add(layout.weights_of(m) + p, scale * jacobian.activation[at(m * n + p)]);
   };
   const auto add_driven = [&](int p) {  // d(u + g)
-    add_error(p, -((shape.is_second_order(shape.player_of(p)) ? gains.k4 : gains.k1) + jacobian.slope[at(p)]));
+    add_error(p, -(gains.k[at(p)] + jacobian.slope[at(p)]));
     if (robust) add_network(p, -1.0);
     for (int k = dynamics_rows.start[at(p)]; k < dynamics_rows.start[at(p + 1)]; ++k) {
       add(layout.x() + dynamics_rows.column[at(k)], jacobian.dynamics[at(k)]);
@@ -73,7 +73,7 @@ std::vector<MatrixEntry> matrix_of(const LoopJacobian& jacobian) {
       add_driven(p);
     } else {
       for (int k = hessian_rows.start[at(p)]; k < hessian_rows.start[at(p + 1)]; ++k) {
-        add(layout.estimates_of(i) + hessian_rows.column[at(k)], -gains.k2 * jacobian.hessian[at(k)]);
+        add(layout.estimates_of(i) + hessian_rows.column[at(k)], -gains.k2[at(p)] * jacobian.hessian[at(k)]);
       }
     }
     finish(layout.reference() + p);
@@ -83,12 +83,12 @@ std::vector<MatrixEntry> matrix_of(const LoopJacobian& jacobian) {
     for (int k = 0; k < n; ++k) {
       const int j = shape.player_of(k);
       for (int edge = graph.start[i]; edge < graph.start[i + 1]; ++edge) {
-        add(layout.estimates_of(i) + k, -gains.k3 * graph.weight[edge]);
-        add(layout.estimates_of(graph.neighbour[edge]) + k, gains.k3 * graph.weight[edge]);
+        add(layout.estimates_of(i) + k, -parameters.gains.k3[at(i)] * graph.weight[edge]);
+        add(layout.estimates_of(graph.neighbour[edge]) + k, parameters.gains.k3[at(i)] * graph.weight[edge]);
       }
       const Real a = parameters.graph.weight(i, j);
-      add(layout.estimates_of(i) + k, -gains.k3 * a);
-      add((shape.is_second_order(j) ? layout.x() : layout.reference()) + k, gains.k3 * a);
+      add(layout.estimates_of(i) + k, -parameters.gains.k3[at(i)] * a);
+      add((shape.is_second_order(j) ? layout.x() : layout.reference()) + k, parameters.gains.k3[at(i)] * a);
       finish(layout.estimates_of(i) + k);
     }
   }
@@ -97,10 +97,10 @@ std::vector<MatrixEntry> matrix_of(const LoopJacobian& jacobian) {
       const Real w = jacobian.weights[at(m * n + p)];
       const Real e = jacobian.error[at(p)];
       const Real r = jacobian.network[at(p)] * jacobian.inverse_bound[at(p)];
-      add_error(p, gains.beta * (jacobian.activation[at(m * n + p)] - r * w));
+      add_error(p, gains.beta[at(p)] * (jacobian.activation[at(m * n + p)] - r * w));
       if (jacobian.inverse_bound[at(p)] != 0.0) {
-        add_network(p, -gains.beta * e * w * jacobian.inverse_bound[at(p)]);
-        add(layout.weights_of(m) + p, -gains.beta * e * r);
+        add_network(p, -gains.beta[at(p)] * e * w * jacobian.inverse_bound[at(p)]);
+        add(layout.weights_of(m) + p, -gains.beta[at(p)] * e * r);
       }
       finish(layout.weights_of(m) + p);
     }

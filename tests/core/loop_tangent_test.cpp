@@ -143,9 +143,14 @@ std::vector<Move> moves_of(const PlainGame& game, RandomNumbers& random) {
   const std::size_t N = game.players;
   const std::size_t D = game.dimension;
   std::vector<Move> moves;
-  const auto add_gain = [&](const char* name, double PlainGame::* plain, Real Gains::* core) {
-    moves.push_back({name, [=](PlainGame& moved, Real s) { moved.*plain += s; },
-                     [=](Parameters& direction) { direction.gains.*core = 1.0; }});
+  const auto add_gain = [&](const char* name, Numbers PlainGame::* plain, std::vector<Real> Gains::* core) {
+    Numbers gains(N);
+    random.fill(gains, -1.0, 1.0);
+    moves.push_back({name,
+                     [=](PlainGame& moved, Real s) {
+                       for (std::size_t i = 0; i < N; ++i) (moved.*plain)[i] += s * gains[i];
+                     },
+                     [=](Parameters& direction) { direction.gains.*core = gains; }});
   };
   add_gain("k1", &PlainGame::k1, &Gains::k1);
   add_gain("k2", &PlainGame::k2, &Gains::k2);
@@ -304,12 +309,12 @@ INSTANTIATE_TEST_SUITE_P(Assorted, LoopTangentOfRandomGame, ::testing::ValuesIn(
 
 TEST(LoopTangent, OfAnAmplitudeOfZeroHasNoRobustTerm) {
   PlainGame game = random_game({.seed = 42, .players = 2, .dimension = 3, .neurons = 4, .order = {2, 1}});
-  game.delta = 0.0;
+  game.delta = everyone(game, 0.0);
   const ClosedLoop loop(parse_game(toml_of(game)).parameters);
   std::vector<Real> state(at(loop.layout().size()));
   loop.initial_state(state.data());
   Parameters direction = loop.parameters().zero_direction();
-  direction.gains.delta = direction.gains.epsilon = 1.0;
+  direction.gains.delta = direction.gains.epsilon = everyone(game, 1.0);
   LoopTangent tangent(loop);
   tangent.follow_parameters(direction, t, state.data(), Modes(at(loop.shape().actions())));
   for (const Real change : rates_and_controls(tangent)) EXPECT_EQ(change, 0.0);

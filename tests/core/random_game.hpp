@@ -53,9 +53,10 @@ struct PlainGame {
   std::vector<int> order;
   bool robust = true;
   bool perturbed = true;
-  double k1 = 0.0, k2 = 0.0, k3 = 0.0, k4 = 0.0, beta = 0.0, delta = 0.0, epsilon = 0.0;
-  bool diagonal = true;  ///< centers are numbers
-  Rows centers;          ///< [m][0], or [m][j D + l]
+  Numbers k1, k2, k3, k4, beta, delta, epsilon;  ///< [i]
+  bool own_gains = false;                        ///< stated by each player for itself
+  bool diagonal = true;                          ///< centers are numbers
+  Rows centers;                                  ///< [m][0], or [m][j D + l]
   double width = 0.0;
   double W_max = 0.0;
   Rows adjacency;  ///< [i][j]
@@ -72,6 +73,9 @@ struct PlainGame {
   }
 };
 
+/// The same number for every player.
+inline Numbers everyone(const PlainGame& game, double number) { return Numbers(game.players, number); }
+
 struct Recipe {
   std::uint64_t seed = 1;
   std::size_t players = 3;
@@ -81,6 +85,7 @@ struct Recipe {
   bool robust = true;
   bool perturbed = true;
   std::vector<int> order = {};  ///< drawn when empty
+  bool own_gains = false;
 };
 
 /// A connected random graph, strongly monotone costs, and nonlinearities of moderate slope.
@@ -98,13 +103,19 @@ inline PlainGame random_game(const Recipe& recipe) {
   }
   game.robust = recipe.robust;
   game.perturbed = recipe.perturbed;
-  game.k1 = random.between(5.0, 12.0);
-  game.k2 = random.between(0.5, 1.5);
-  game.k3 = random.between(20.0, 60.0);
-  game.k4 = random.between(15.0, 40.0);
-  game.beta = random.between(20.0, 90.0);
-  game.delta = random.between(2.0, 8.0);
-  game.epsilon = random.between(0.5, 2.0);
+  game.own_gains = recipe.own_gains;
+  const auto draw = [&](double low, double high) {
+    Numbers gains = everyone(game, random.between(low, high));
+    if (game.own_gains) random.fill(gains, low, high);
+    return gains;
+  };
+  game.k1 = draw(5.0, 12.0);
+  game.k2 = draw(0.5, 1.5);
+  game.k3 = draw(20.0, 60.0);
+  game.k4 = draw(15.0, 40.0);
+  game.beta = draw(20.0, 90.0);
+  game.delta = draw(2.0, 8.0);
+  game.epsilon = draw(0.5, 2.0);
   game.diagonal = recipe.diagonal;
   game.centers = rows_of(recipe.neurons, recipe.diagonal ? 1 : N * D);
   random.fill(game.centers, -2.0, 2.0);
@@ -175,16 +186,11 @@ inline std::string toml_of(const PlainGame& game) {
   std::string text = "title = \"random game\"\ndimension = " + std::to_string(game.dimension) + '\n';
   text += std::string("[strategy]\nrobust = ") + (game.robust ? "true" : "false") +
           "\nperturbed = " + (game.perturbed ? "true" : "false") + '\n';
+  const std::pair<const char*, const Numbers&> gains[] = {
+      {"k1", game.k1},     {"k2", game.k2},       {"k3", game.k3},          {"k4", game.k4},
+      {"beta", game.beta}, {"delta", game.delta}, {"epsilon", game.epsilon}};
   text += "[gains]\n";
-  for (const auto& [name, value] : {std::pair{"k1", game.k1},
-                                    {"k2", game.k2},
-                                    {"k3", game.k3},
-                                    {"k4", game.k4},
-                                    {"beta", game.beta},
-                                    {"delta", game.delta},
-                                    {"epsilon", game.epsilon}}) {
-    text += name + (" = " + toml_of(value)) + '\n';
-  }
+  for (const auto& [name, values] : gains) text += name + (" = " + toml_of(values[0])) + '\n';
   Numbers diagonal_centers;
   for (const Numbers& center : game.centers) diagonal_centers.push_back(center[0]);
   text += "[rbf]\ncenters = " + (game.diagonal ? toml_of(diagonal_centers) : toml_of(game.centers)) +
@@ -204,12 +210,17 @@ inline std::string toml_of(const PlainGame& game) {
       if (game.coupling[i][j] == 0.0) continue;
       coupling += (coupling.empty() ? "[" : ", [") + std::to_string(j + 1) + ", " + toml_of(game.coupling[i][j]) + ']';
     }
+    std::string own_gains;
+    for (const auto& [name, values] : gains) {
+      if (!game.own_gains || name == std::string_view(game.order[i] == 1 ? "k4" : "k1")) continue;
+      own_gains += (own_gains.empty() ? "\ngains = { " : ", ") + std::string(name) + " = " + toml_of(values[i]);
+    }
     text += "[[player]]\nname = \"player " + std::to_string(i + 1) + "\"\norder = " + std::to_string(game.order[i]) +
-            "\nx0 = " + toml_of(game.x0[i]) + (game.order[i] == 1 ? "\nz0 = " : "\nv0 = ") +
-            toml_of(game.reference0[i]) + "\ny0 = " + toml_of(game.y0[i]) +
-            "\ncost = { quadratic = " + toml_of(game.quadratic[i]) + ", linear = " + toml_of(game.linear[i]) +
-            ", constant = " + toml_of(game.constant[i]) + ", coupling = [" + coupling +
-            "] }\ndynamics = { linear = " + pairs_of(game.G[i]) + ", square = " + pairs_of(game.H[i]) +
+            own_gains + (own_gains.empty() ? "" : " }") + "\nx0 = " + toml_of(game.x0[i]) +
+            (game.order[i] == 1 ? "\nz0 = " : "\nv0 = ") + toml_of(game.reference0[i]) +
+            "\ny0 = " + toml_of(game.y0[i]) + "\ncost = { quadratic = " + toml_of(game.quadratic[i]) +
+            ", linear = " + toml_of(game.linear[i]) + ", constant = " + toml_of(game.constant[i]) + ", coupling = [" +
+            coupling + "] }\ndynamics = { linear = " + pairs_of(game.G[i]) + ", square = " + pairs_of(game.H[i]) +
             " }\ndisturbance = { amplitude = " + toml_of(game.amplitude[i]) +
             ", frequency = " + toml_of(game.frequency[i]) + ", phase = " + toml_of(game.phase[i]) +
             ", bias = " + toml_of(game.bias[i]) + " }\n";
@@ -230,6 +241,8 @@ inline std::vector<Recipe> assorted_recipes() {
       {.seed = 8, .players = 4, .dimension = 3, .neurons = 6, .robust = false},
       {.seed = 9, .players = 4, .dimension = 2, .neurons = 9, .perturbed = false},
       {.seed = 10, .players = 3, .dimension = 4, .neurons = 2, .diagonal = false, .robust = false, .perturbed = false},
+      {.seed = 12, .players = 5, .dimension = 2, .neurons = 3, .order = {2, 1, 1, 2, 1}, .own_gains = true},
+      {.seed = 13, .players = 10, .dimension = 1, .neurons = 4, .diagonal = false, .own_gains = true},
       {.seed = 11, .players = 9, .dimension = 4, .neurons = 13, .order = {1, 2, 2, 1, 2, 1, 1, 2, 2}},
   };
 }

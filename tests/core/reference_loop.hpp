@@ -125,29 +125,29 @@ LoopState<Scalar> reference_rate(const PlainGame& game, double t, const LoopStat
       // grad_i f_i(y_i), by differentiating f_i term by term
       Scalar gradient = 2.0 * game.quadratic[i] * y[i][i][l] + game.linear[i][l];
       for (std::size_t j = 0; j < N; ++j) gradient += 2.0 * game.coupling[i][j] * (y[i][i][l] - y[i][j][l]);
-      const Scalar e = game.order[i] == 1 ? x[i][l] - reference[i][l] : reference[i][l] + game.k2 * gradient;
+      const Scalar e = game.order[i] == 1 ? x[i][l] - reference[i][l] : reference[i][l] + game.k2[i] * gradient;
       Scalar network{};
       for (std::size_t m = 0; m < q; ++m) network += W[i][m][l] * s.activation[i][m];
-      Scalar phi = game.delta * tanh(K * game.delta * e / game.epsilon);
+      Scalar phi = game.delta[i] * tanh(K * game.delta[i] * e / game.epsilon[i]);
       if (!game.robust) network = phi = Scalar{};
       Scalar g{};
       for (std::size_t j = 0; j < N; ++j) g += game.G[i][j][l] * x[j][l] + game.H[i][j][l] * x[j][l] * x[j][l];
       Scalar d = game.bias[i][l] + game.amplitude[i][l] * std::sin(game.frequency[i][l] * t + game.phase[i][l]);
       if (!game.perturbed) g = d = Scalar{};
       d += d_ext[i][l];
-      const Scalar u = -(game.order[i] == 1 ? game.k1 : game.k4) * e - network - phi;
+      const Scalar u = -(game.order[i] == 1 ? game.k1[i] : game.k4[i]) * e - network - phi;
 
       if (game.order[i] == 1) {
         rate.x[i][l] = u + g + d;
-        rate.reference[i][l] = -game.k2 * gradient;
+        rate.reference[i][l] = -game.k2[i] * gradient;
       } else {
         rate.x[i][l] = reference[i][l];
         rate.reference[i][l] = u + g + d;
       }
       for (std::size_t m = 0; m < q && game.robust; ++m) {
-        rate.W[i][m][l] = game.beta * s.activation[i][m] * e;
+        rate.W[i][m][l] = game.beta[i] * s.activation[i][m] * e;
         if (on_sphere[i][l] != 0 && std::real(e * network) >= 0.0) {
-          rate.W[i][m][l] -= game.beta * e * network / game.W_max * W[i][m][l];
+          rate.W[i][m][l] -= game.beta[i] * e * network / game.W_max * W[i][m][l];
         }
       }
       s.gradient[i][l] = gradient;
@@ -163,7 +163,7 @@ LoopState<Scalar> reference_rate(const PlainGame& game, double t, const LoopStat
       for (std::size_t l = 0; l < D; ++l) {
         Scalar sum = game.adjacency[i][j] * (y[i][j][l] - s.shared[j][l]);
         for (std::size_t k = 0; k < N; ++k) sum += game.adjacency[i][k] * (y[i][j][l] - y[k][j][l]);
-        rate.y[i][j][l] = -game.k3 * sum;
+        rate.y[i][j][l] = -game.k3[i] * sum;
       }
     }
   }

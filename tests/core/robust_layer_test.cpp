@@ -38,10 +38,19 @@ struct Linearized {
     const bool second = loop.shape().is_second_order(loop.shape().player_of(p));
     return at((second ? loop.layout().reference() : loop.layout().x()) + p);
   }
-  [[nodiscard]] Real phi(Real e) const {
-    const Gains& gains = loop.parameters().gains;
-    return gains.delta * std::tanh(K * gains.delta * e / gains.epsilon);
+  [[nodiscard]] std::size_t player(std::size_t p) const { return p % game.players; }
+  /// Of column p.
+  [[nodiscard]] Real phi(std::size_t p, Real e) const {
+    const std::size_t i = player(p);
+    return game.delta[i] * std::tanh(K * game.delta[i] * e / game.epsilon[i]);
   }
+  [[nodiscard]] Real slope(std::size_t p, Real e) const {
+    const std::size_t i = player(p);
+    return K * game.delta[i] * game.delta[i] / game.epsilon[i] /
+           std::pow(std::cosh(K * game.delta[i] * e / game.epsilon[i]), 2);
+  }
+  /// Half the width of the layer of column p.
+  [[nodiscard]] Real width(std::size_t p) const { return game.epsilon[player(p)] / (K * game.delta[player(p)]); }
   /// A state that differs from this one by up to the size in each entry.
   [[nodiscard]] std::vector<Real> near(const std::vector<Real>& from, Real size) {
     std::vector<Real> moved = from;
@@ -59,8 +68,8 @@ struct Linearized {
     Real largest = weight[place(p)];
     for (int m = 0; m < loop.shape().neurons; ++m) {
       const Real activation = jacobian.activation[at(m * loop.shape().actions() + p)];
-      largest = std::max(
-          largest, gamma * loop.parameters().gains.beta * activation * weight[at(loop.layout().weights_of(m) + p)]);
+      const Real beta = game.beta[player(at(p))];
+      largest = std::max(largest, gamma * beta * activation * weight[at(loop.layout().weights_of(m) + p)]);
     }
     return largest;
   }
@@ -77,9 +86,7 @@ struct Linearized {
 };
 
 /// Defects that are a part of phi's range count more.
-Real counted(Real defect, const Gains& gains) {
-  return std::fabs(defect) * (1.0 + 20.0 * std::fabs(defect) / gains.delta);
-}
+Real counted(Real defect, Real delta) { return std::fabs(defect) * (1.0 + 20.0 * std::fabs(defect) / delta); }
 
 TEST(RobustLayer, TellsWhetherTheLinearizationHolds) {
   int checked = 0;
@@ -95,17 +102,13 @@ TEST(RobustLayer, TellsWhetherTheLinearizationHolds) {
       const std::vector<Real> e0 = loop.errors(loop.state);
       const std::vector<Real> e1 = loop.errors(evaluated);
       const std::vector<Real> e2 = loop.errors(state);
-      const Gains& gains = loop.loop.parameters().gains;
       Real defect = 0.0;
       for (std::size_t p = 0; p < e0.size(); ++p) {
-        const auto slope_at = [&](Real e) {
-          return K * gains.delta * gains.delta / gains.epsilon /
-                 std::pow(std::cosh(K * gains.delta * e / gains.epsilon), 2);
-        };
-        const Real slope = slope_at(e0[p]);
-        const Real missed = std::fabs(loop.phi(e2[p]) - loop.phi(e1[p]) - slope * (e2[p] - e1[p]));
-        const Real share = gamma / (1.0 + gamma * std::min(slope, slope_at(e2[p])));
-        defect = std::max(defect, share * counted(missed, gains) * loop.heaviest(static_cast<int>(p), gamma, weight));
+        const Real slope = loop.slope(p, e0[p]);
+        const Real missed = std::fabs(loop.phi(p, e2[p]) - loop.phi(p, e1[p]) - slope * (e2[p] - e1[p]));
+        const Real share = gamma / (1.0 + gamma * std::min(slope, loop.slope(p, e2[p])));
+        const Real delta = loop.game.delta[loop.player(p)];
+        defect = std::max(defect, share * counted(missed, delta) * loop.heaviest(static_cast<int>(p), gamma, weight));
       }
       loop.loop.evaluate_seeking(evaluated.data(), loop.signals);
       const auto holds = [&](Real tolerance) {
@@ -121,21 +124,18 @@ TEST(RobustLayer, TellsWhetherTheLinearizationHolds) {
   EXPECT_GT(checked, 20);
 }
 
-/// The weighted difference between phi after a step from e0 to e1 and what the linearization at e0 foretells.
+/// Of column 0, the weighted difference between phi after a step from e0 to e1 and what the linearization at e0
+/// foretells.
 Real defect_of(const Linearized& loop, Real gamma, Real weight, Real e0, Real e1) {
-  const Gains& gains = loop.loop.parameters().gains;
-  const auto slope = [&](Real e) {
-    return K * gains.delta * gains.delta / gains.epsilon / std::pow(std::cosh(K * gains.delta * e / gains.epsilon), 2);
-  };
-  const Real missed = loop.phi(e1) - loop.phi(e0) - slope(e0) * (e1 - e0);
-  return gamma * counted(missed, gains) / (1.0 + gamma * std::min(slope(e0), slope(e1))) * weight;
+  const Real slope = loop.slope(0, e0);
+  const Real missed = loop.phi(0, e1) - loop.phi(0, e0) - slope * (e1 - e0);
+  return gamma * counted(missed, loop.game.delta[0]) / (1.0 + gamma * std::min(slope, loop.slope(0, e1))) * weight;
 }
 
 TEST(RobustLayer, TellsSoForAnyStepInAStiffLayer) {
   Linearized loop({.seed = 21, .players = 2, .dimension = 1, .neurons = 1, .order = {1, 2}}, 3);
-  const Gains& gains = loop.loop.parameters().gains;
-  const Real layer = gains.epsilon / (K * gains.delta);
-  const Real gamma = 1e3 * layer / gains.delta;  // a thousand times the inverse of the steepest slope
+  const Real layer = loop.width(0);
+  const Real gamma = 1e3 * layer / loop.game.delta[0];  // a thousand times the inverse of the steepest slope
   const std::vector<Real> weight(loop.state.size(), 3.0);
   const auto with_error = [&](Real error) {
     std::vector<Real> state = loop.state;
@@ -161,13 +161,12 @@ TEST(RobustLayer, TellsSoForAnyStepInAStiffLayer) {
 }
 
 TEST(RobustLayer, StopsInTheMiddleWhatACorrectionCarriedAcross) {
-  Linearized loop({.seed = 11, .players = 4, .dimension = 3, .neurons = 2, .order = {1, 2, 2, 1}}, 9);
-  const Gains& gains = loop.loop.parameters().gains;
-  const Real layer = gains.epsilon / (K * gains.delta);
+  Linearized loop({.seed = 11, .players = 4, .dimension = 3, .neurons = 2, .order = {1, 2, 2, 1}, .own_gains = true},
+                  9);
   const auto with_errors = [&](auto wanted) {  // in layers
     std::vector<Real> state = loop.state;
     const std::vector<Real> errors = loop.errors(state);
-    for (int p = 0; p < 12; ++p) state[loop.place(p)] += wanted(p) * layer - errors[at(p)];
+    for (int p = 0; p < 12; ++p) state[loop.place(p)] += wanted(p) * loop.width(at(p)) - errors[at(p)];
     return state;
   };
   // by p mod 4: stays outside; carried across; comes from the middle; moves a little within the layer

@@ -77,6 +77,25 @@ TEST(Variables, AreThoseOfTheSpecification) {
   EXPECT_EQ(count("W"), N * q * D);
 }
 
+TEST(Variables, GainsAreThoseOfEachPlayerWhereOneStatesItsOwn) {
+  Slave slave(small_game_with({{"x0 = [-0.6", "gains = { k4 = 16.0, epsilon = 0.04 }\nx0 = [-0.6"}}));
+  const ModelVariables& variables = slave.model().variables;
+  for (const auto& [family, players] :
+       std::map<const char*, std::vector<int>>{{"k1", {1, 3}}, {"k4", {2}}, {"k2", {1, 2, 3}}, {"delta", {1, 2, 3}}}) {
+    ASSERT_EQ(variables.find(family)->count, static_cast<int>(players.size())) << family;
+    for (const int i : players) EXPECT_TRUE(variables.find(family, i - 1)) << family << i;
+  }
+  EXPECT_EQ(slave.get("k1[3]"), 6.0);
+  EXPECT_EQ(slave.get("k4[2]"), 16.0);
+  EXPECT_EQ(slave.get("epsilon[2]"), 0.04);
+  EXPECT_EQ(slave.get("epsilon[3]"), 0.05);
+  EXPECT_EQ(slave.set("k3[2]", 0.0), fmi2Error);
+  EXPECT_NE(slave.last_message().find("k3[2]"), std::string::npos) << slave.last_message();
+  ASSERT_EQ(slave.set("k3[2]", 30.0), fmi2OK);
+  EXPECT_EQ(slave.get("k3[1]"), 20.0);
+  EXPECT_EQ(slave.get("k3[2]"), 30.0);
+}
+
 TEST(Variables, ReadTheRightEntries) {
   Slave slave;
   EXPECT_EQ(slave.get("a[1,2]"), 1.3);

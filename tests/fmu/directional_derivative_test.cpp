@@ -400,7 +400,9 @@ TEST(DirectionalDerivative, OfModelExchangeIsThatOfRatesAndOutputs) {
 // long as parameters stay (tunable), or not (dependent).
 TEST(Structure, DependenciesInARunAreMinimalAndOfTheirKind) {
   const std::string three = small_game_with({{"W_max = 0.5", "W_max = 0.05"}});
-  for (const std::string& game : {three, vector_centers_game()}) {
+  const std::string own_gains =
+      small_game_with({{"W_max = 0.5", "W_max = 0.05"}, {"v0 = [0.25", "gains = { k3 = 25.0 }\nv0 = [0.25"}});
+  for (const std::string& game : {three, vector_centers_game(), own_gains}) {
     Slave slave(game);
     const DependencyTable declared = dependencies_of(slave.model(), Equations::running);
     std::vector<std::vector<Table>> tables;  // by parameters, then by state

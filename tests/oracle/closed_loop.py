@@ -89,6 +89,16 @@ def signals(game: Game, state: Numbers) -> Signals:
     return Signals(S, gradient, e, nn, phi, u)
 
 
+def _per_entry(value: Numbers | float) -> Numbers | float:
+    """A number of each player (N, 1), as a factor of arrays (N, D, ...) of three dimensions."""
+    return value[..., np.newaxis] if isinstance(value, np.ndarray) else value
+
+
+def _of(value: Numbers | float, players: NDArray[np.int_]) -> Numbers | float:
+    """The numbers of some players (K, 1), of each player's (N, 1)."""
+    return value[players] if isinstance(value, np.ndarray) else value
+
+
 def state_rate(
     game: Game, t: float, state: Numbers, on_sphere: NDArray[np.bool_], d_ext: FloatArray
 ) -> Numbers:
@@ -119,16 +129,16 @@ def state_rate(
     p_rate = np.where(first, paper.reference_rate(game.k2, now.gradient), v_rate)
 
     xbar = paper.shared_signal(game.first_order, s.x, s.p)
-    y_rate = paper.estimate_rate(game.k3, game.adjacency, s.y, xbar)
+    y_rate = paper.estimate_rate(_per_entry(game.k3), game.adjacency, s.y, xbar)
 
     if not game.robust:
         return pack(x_rate, p_rate, y_rate, np.zeros_like(s.W))
     S = now.S[:, np.newaxis, :]
-    column_rate = paper.adaptation_inside(game.beta, S, now.e)  # (N, D, q)
+    column_rate = paper.adaptation_inside(_per_entry(game.beta), S, now.e)  # (N, D, q)
     if on_sphere.any():
         i, coordinate = np.nonzero(on_sphere)
         column_rate[i, coordinate] = paper.adaptation_on_sphere(
-            game.beta, now.S[i], now.e[i, coordinate], s.W[i, :, coordinate]
+            _of(game.beta, i), now.S[i], now.e[i, coordinate], s.W[i, :, coordinate]
         )
     return pack(x_rate, p_rate, y_rate, column_rate.transpose(0, 2, 1))
 

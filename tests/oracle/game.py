@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 FloatArray: TypeAlias = NDArray[np.float64]
 Table: TypeAlias = dict[str, Any]
+OfPlayers: TypeAlias = Any  # one float for all players, or (N, 1) where they have their own
 
 LARGEST_PLAYERS = 1000
 LARGEST_DIMENSION = 100
@@ -42,13 +43,13 @@ class Game:
     order: NDArray[np.int_]  # (N,), 1 velocity-driven, 2 acceleration-driven
     robust: bool
     perturbed: bool
-    k1: float
-    k2: float
-    k3: float
-    k4: float
-    beta: float
-    delta: float
-    epsilon: float
+    k1: OfPlayers
+    k2: OfPlayers
+    k3: OfPlayers
+    k4: OfPlayers
+    beta: OfPlayers
+    delta: OfPlayers
+    epsilon: OfPlayers
     centers: FloatArray  # (q, N D), the vectors mu_m; player-major: entry j D + l meets y_ijl
     width: float  # rho
     W_max: float
@@ -127,7 +128,7 @@ def game_from_table(table: Table) -> Game:
         player = _table(entry, where)
         order[i] = _integer(player.get("order"), 1, 2, f"{where}: order")
         own_start = "z0" if order[i] == 1 else "v0"
-        optional = {own_start, "y0", "cost", "dynamics", "disturbance"}
+        optional = {own_start, "gains", "y0", "cost", "dynamics", "disturbance"}
         _check_keys(player, {"name", "order", "x0"}, optional, where)
         names.append(_text(player["name"], f"{where}: name"))
         for key in ("x0", own_start):
@@ -162,7 +163,7 @@ def game_from_table(table: Table) -> Game:
         order=order,
         robust=_boolean(strategy.get("robust", True), "strategy.robust"),
         perturbed=_boolean(strategy.get("perturbed", True), "strategy.perturbed"),
-        **{name: _positive(gains[name], f"gains.{name}") for name in GAIN_NAMES},
+        **_gains(gains, [_table(entry.get("gains", {}), "gains of a player") for entry in tables]),
         centers=_centers(rbf["centers"], N * D),
         width=_positive(rbf["width"], "rbf.width"),
         W_max=_positive(rbf["W_max"], "rbf.W_max"),
@@ -183,6 +184,19 @@ def game_from_table(table: Table) -> Game:
         disturbance_phase=disturbance["phase"],
         disturbance_bias=disturbance["bias"],
     )
+
+
+def _gains(common: Table, own: list[Table]) -> dict[str, OfPlayers]:
+    """Each player's own gains before the common ones; floats where no player has any."""
+    gains = {name: _positive(common[name], f"gains.{name}") for name in GAIN_NAMES}
+    if not any(own):
+        return gains
+    for table in own:
+        _check_keys(table, set(), set(GAIN_NAMES), "gains of a player")
+    return {
+        name: np.array([[_positive(table.get(name, value), f"gains.{name}")] for table in own])
+        for name, value in gains.items()
+    }
 
 
 def _check_keys(table: Table, required: set[str], optional: set[str], where: str) -> None:

@@ -39,7 +39,8 @@ def linear_loop(game: Game, dimension: int | None = None) -> tuple[FloatArray, F
     h = gradient_coefficients(game)
     # Row i of the gradient map reads player i's own estimates y_i: e_i^T (x) h_i.
     gradient = np.vstack([np.kron(np.eye(N)[i], h[i]) for i in range(N)])  # (N, N^2)
-    consensus = game.k3 * (np.kron(laplacian(game.adjacency), np.eye(N)) + np.diag(game.adjacency.ravel()))
+    k3 = np.repeat(np.broadcast_to(game.k3, (N, 1)), N, axis=0)  # of y_ij at i N + j
+    consensus = k3 * (np.kron(laplacian(game.adjacency), np.eye(N)) + np.diag(game.adjacency.ravel()))
     everyone = np.kron(np.ones((N, 1)), np.eye(N))  # xbar -> 1 (x) xbar
 
     # Order 1: x' = -k1 (x - z), z' = -k2 grad.  Order 2: x' = v, v' = -k4 v - k2 k4 grad.
