@@ -10,7 +10,7 @@
 
 namespace mixed_order_game {
 
-BlockElimination::BlockElimination(const CommunicationGraph& graph) {
+BlockElimination::BlockElimination(const CommunicationGraph& graph) : directed(graph.directed()) {
   const int n = graph.players();
   std::vector<Eigen::Triplet<double, int>> entries;
   for (int i = 0; i < n; ++i) entries.emplace_back(i, i, 1.0);
@@ -37,7 +37,7 @@ BlockElimination::BlockElimination(const CommunicationGraph& graph) {
   }
   const auto is_full = [&](int k) { return column[at(k)].size() == at(n - 1 - k); };
   listed = n;
-  while (listed > 0 && is_full(listed - 1)) --listed;
+  while (!directed && listed > 0 && is_full(listed - 1)) --listed;
   listed += (n - listed) % full_step;
   start.push_back(0);
   for (int k = 0; k < listed; ++k) {
@@ -81,7 +81,8 @@ std::int64_t BlockElimination::bytes() const {
     const std::int64_t rows = start[at(k + 1)] - start[at(k)];
     pairs += rows * (rows - 1) / 2;
   }
-  return (entries() + n) * padded * std::int64_t{sizeof(Real)} + pairs * std::int64_t{sizeof(int)};
+  return ((directed ? 2 : 1) * std::int64_t{entries()} + n) * padded * std::int64_t{sizeof(Real)} +
+         pairs * std::int64_t{sizeof(int)};
 }
 
 void require_moderate_factors(const CommunicationGraph& graph) {

@@ -8,12 +8,14 @@
 
 namespace mixed_order_game {
 
-/// Players in an order of minimum degree, and the entries that L gets when they are eliminated. From some column on L
-/// is full, with a complete graph from the first: of these columns, a multiple of full_step of them, nothing is listed.
+/// Players in an order of minimum degree, and the entries that L gets when they are eliminated; with a directed graph U
+/// gets those of L'. From some column on L is full, with a complete graph from the first: of these columns, a multiple
+/// of full_step of them, nothing is listed, unless the graph is directed.
 struct BlockElimination {
   BlockElimination() = default;
   explicit BlockElimination(const CommunicationGraph& graph);
 
+  bool directed = false;
   std::vector<int> order;  ///< order[k] is the player eliminated k-th
   int listed = 0;          ///< columns before the full ones
   std::vector<int> start;  ///< column k < listed: entries start[k] .. start[k + 1] - 1

@@ -8,14 +8,19 @@
 namespace mixed_order_game {
 
 GainRows::GainRows(const Shape& shape) {
-  for (AlignedVector* row : {&k, &k2, &beta, &delta, &sharpness, &steepest}) row->resize(at(shape.actions()));
+  for (AlignedVector* row : {&k, &k2, &beta, &delta, &sharpness, &steepest, &W_max}) row->resize(at(shape.actions()));
+  sharpness_of_activations.resize(at(shape.players));
 }
 
-void GainRows::refresh(const Shape& shape, const Gains& gains) {
+void GainRows::refresh(const Shape& shape, const Gains& gains, const RbfNetwork& rbf) {
+  for (std::size_t i = 0; i < rbf.width.size(); ++i) {
+    sharpness_of_activations[i] = 1.0 / (rbf.width[i] * rbf.width[i]);
+  }
   for (int entry = 0; entry < shape.actions(); ++entry) {
     const std::size_t p = at(entry);
     const std::size_t i = at(shape.player_of(entry));
     k[p] = shape.order[i] == 2 ? gains.k4[i] : gains.k1[i];
+    W_max[p] = rbf.W_max[i];
     k2[p] = gains.k2[i];
     beta[p] = gains.beta[i];
     delta[p] = gains.delta[i];
@@ -32,7 +37,7 @@ ClosedLoop::ClosedLoop(Parameters parameters)
 void ClosedLoop::refresh() {
   parameters_.disturbance->time_origin = time_origin_;
   parameters_.refresh();
-  gains_.refresh(parameters_.shape, parameters_.gains);
+  gains_.refresh(parameters_.shape, parameters_.gains, parameters_.rbf);
 }
 
 void ClosedLoop::set_time_origin(Real time_origin) {
@@ -40,11 +45,24 @@ void ClosedLoop::set_time_origin(Real time_origin) {
   parameters_.disturbance->refresh();
 }
 
+void ClosedLoop::initial_state(Real* state) const {
+  initial_state(parameters_.initial, state);
+  if (parameters_.initial.W.empty()) return;
+  AlignedVector norm2(at(shape().actions()));
+  weight_norms(state, norm2.data());
+  for (int p = 0; p < shape().actions(); ++p) {
+    const Real factor = std::sqrt(gains_.W_max[at(p)] / norm2[at(p)]);
+    if (!(factor < 1.0)) continue;
+    for (int m = 0; m < shape().neurons; ++m) state[layout_.weights_of(m) + p] *= factor;
+  }
+}
+
 void ClosedLoop::initial_state(const InitialState& initial, Real* state) const {
   std::copy(initial.x.begin(), initial.x.end(), state + layout_.x());
   std::copy(initial.reference.begin(), initial.reference.end(), state + layout_.reference());
   std::copy(initial.y.begin(), initial.y.end(), state + layout_.estimates());
-  std::fill(state + layout_.weights(), state + layout_.size(), 0.0);
+  Real* W = state + layout_.weights();
+  std::fill(std::copy(initial.W.begin(), initial.W.end(), W), state + layout_.size(), 0.0);
 }
 
 void ClosedLoop::evaluate_errors(const Real* state, Signals& signals) const {
@@ -75,9 +93,16 @@ void ClosedLoop::evaluate_network(const Real* state, Signals& signals) const {
   const Kernels& kernel = kernels();
   const RbfNetwork& rbf = parameters_.rbf;
   const Shape& shape = parameters_.shape;
-  const auto activations = rbf.diagonal ? kernel.activations_diagonal : kernel.activations_general;
-  activations(shape.players, shape.dimension, shape.neurons, rbf.centers.data(), rbf.width, state + layout_.estimates(),
-              signals.exponent.data(), signals.activation.data());
+  const Real* y = state + layout_.estimates();
+  if (rbf.diagonal) {
+    kernel.activations_diagonal(shape.players, shape.dimension, shape.neurons, rbf.centers.data(),
+                                gains_.sharpness_of_activations.data(), y, signals.exponent.data(),
+                                signals.activation.data());
+  } else {
+    kernel.activations_general(shape.players, shape.dimension, shape.neurons, rbf.per_player ? shape.players : 1,
+                               rbf.centers.data(), gains_.sharpness_of_activations.data(), y, signals.exponent.data(),
+                               signals.activation.data());
+  }
   kernel.column_products(shape.actions(), shape.neurons, state + layout_.weights(), signals.activation.data(),
                          signals.network.data());
 }
@@ -111,7 +136,7 @@ void ClosedLoop::evaluate(Real t, const Real* state, const Real* d_ext, const Mo
   evaluate_seeking(state, signals);
   if (strategy.robust) {
     for (int p = 0; p < n; ++p)
-      signals.radial[at(p)] = modes[at(p)] != 0 && e[p] * s[p] >= 0.0 ? s[p] / rbf.W_max : 0.0;
+      signals.radial[at(p)] = modes[at(p)] != 0 && e[p] * s[p] >= 0.0 ? s[p] / gains_.W_max[at(p)] : 0.0;
     kernel.weight_rates(n, shape.neurons, gains_.beta.data(), e, signals.radial.data(), signals.activation.data(),
                         state + layout_.weights(), rate + layout_.weights());
   } else {
@@ -153,13 +178,13 @@ void ClosedLoop::event_functions(const Real* state, const Modes& modes, Real tol
     std::fill_n(values, modes.size(), -1.0);
     return;
   }
-  const Real W_max = parameters_.rbf.W_max;
   weight_norms(state, values);
   if (std::any_of(modes.begin(), modes.end(), [](auto mode) { return mode != 0; })) {
     evaluate_errors(state, signals);
     evaluate_network(state, signals);
   }
   for (std::size_t p = 0; p < modes.size(); ++p) {
+    const Real W_max = gains_.W_max[p];
     const Real height = values[p] / W_max - 1.0;
     const Real rate = 2.0 * gains_.beta[p] * signals.error[p] * signals.network[p] / W_max;  // of w'w / W_max, inside
     const Real value = modes[p] == 0 ? height : std::min(-tolerance - height, -rate);
@@ -184,13 +209,13 @@ void ClosedLoop::project(const Modes& modes, Signals& signals, Real* state) cons
     evaluate_errors(state, signals);
     evaluate_network(state, signals);
   }
-  const Real W_max = parameters_.rbf.W_max;
   for (int p = 0; p < shape().actions(); ++p) {
     Real norm2 = 0.0;
     for (int m = 0; m < shape().neurons; ++m) {
       const Real w = state[layout_.weights_of(m) + p];
       norm2 += w * w;
     }
+    const Real W_max = gains_.W_max[at(p)];
     const bool slides = modes[at(p)] != 0 && norm2 > 0.0 && signals.error[at(p)] * signals.network[at(p)] >= 0.0;
     if (!(norm2 > W_max || slides)) continue;
     const Real factor = std::sqrt(W_max / norm2);

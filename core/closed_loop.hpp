@@ -10,10 +10,10 @@
 
 namespace mixed_order_game {
 
-/// The gains as rows of a joint action, at entry(i, l), and what is computed from them alone.
+/// What players have of their own, as rows of a joint action at entry(i, l), and what is computed from it alone.
 struct GainRows {
   explicit GainRows(const Shape& shape);
-  void refresh(const Shape& shape, const Gains& gains);
+  void refresh(const Shape& shape, const Gains& gains, const RbfNetwork& rbf);
 
   AlignedVector k;  ///< k1 (order 1) or k4 (order 2)
   AlignedVector k2;
@@ -21,6 +21,8 @@ struct GainRows {
   AlignedVector delta;
   AlignedVector sharpness;  ///< K delta / epsilon
   AlignedVector steepest;   ///< K delta^2 / epsilon, the largest slope of the robust term
+  AlignedVector W_max;
+  AlignedVector sharpness_of_activations;  ///< 1 / rho^2, by player
 };
 
 class ClosedLoop {
@@ -40,9 +42,9 @@ class ClosedLoop {
   [[nodiscard]] const StateLayout& layout() const { return layout_; }
   [[nodiscard]] const GainRows& gains() const { return gains_; }
 
-  /// state[size()] at the start of a run, from x0, z0, v0, y0 and W = 0.
-  void initial_state(Real* state) const { initial_state(parameters_.initial, state); }
-  /// The same from other values, such as those of a direction.
+  /// state[size()] at the start of a run, from x0, z0, v0, y0 and W0, scaled down to the sphere where it is outside.
+  void initial_state(Real* state) const;
+  /// The same from other values, such as those of a direction, and not scaled.
   void initial_state(const InitialState& initial, Real* state) const;
 
   /// The first of the signals: xbar, gradient and error.

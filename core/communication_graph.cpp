@@ -4,13 +4,14 @@
 
 namespace mixed_order_game {
 
-CommunicationGraph::CommunicationGraph(int players) : players_(players), adjacency_(at(players) * at(players)) {
+CommunicationGraph::CommunicationGraph(int players, bool directed)
+    : players_(players), directed_(directed), adjacency_(at(players) * at(players)) {
   refresh();
 }
 
 void CommunicationGraph::set_weight(int i, int j, Real weight) {
   adjacency_[at(i) * at(players_) + at(j)] = weight;
-  adjacency_[at(j) * at(players_) + at(i)] = weight;
+  if (!directed_) adjacency_[at(j) * at(players_) + at(i)] = weight;
 }
 
 void CommunicationGraph::refresh() {
@@ -32,7 +33,7 @@ std::vector<std::pair<int, int>> CommunicationGraph::edges() const {
   std::vector<std::pair<int, int>> edges;
   for (int i = 0; i < players_; ++i) {
     for (int j = i + 1; j < players_; ++j) {
-      if (weight(i, j) > 0.0) edges.emplace_back(i, j);
+      if (weight(i, j) > 0.0 || weight(j, i) > 0.0) edges.emplace_back(i, j);
     }
   }
   return edges;
@@ -57,6 +58,28 @@ std::vector<std::vector<int>> CommunicationGraph::components() const {
     components.push_back(std::move(component));
   }
   return components;
+}
+
+// Strongly connected: every player is reached from the first one, and the first one from every player.
+std::optional<std::pair<int, int>> CommunicationGraph::not_reached() const {
+  for (const bool from_first : {true, false}) {
+    std::vector<int> found{0};
+    std::vector<bool> seen(at(players_), false);
+    seen[0] = true;
+    for (std::size_t next = 0; next < found.size(); ++next) {
+      for (int j = 0; j < players_; ++j) {
+        const Real heard = from_first ? weight(j, found[next]) : weight(found[next], j);
+        if (seen[at(j)] || !(heard > 0.0)) continue;
+        seen[at(j)] = true;
+        found.push_back(j);
+      }
+    }
+    const auto missing = std::find(seen.begin(), seen.end(), false);
+    if (missing == seen.end()) continue;
+    const int j = static_cast<int>(missing - seen.begin());
+    return from_first ? std::pair(0, j) : std::pair(j, 0);
+  }
+  return std::nullopt;
 }
 
 }  // namespace mixed_order_game

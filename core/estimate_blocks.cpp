@@ -10,15 +10,16 @@ void EstimateBlocks::analyse(const CommunicationGraph& graph, const std::vector<
   factored_ = 0.0;
   players_ = graph.players();
   dimension_ = dimension;
+  directed_ = graph.directed();
   k3_ = k3[0];
   scale_.clear();
-  if (std::any_of(k3.begin(), k3.end(), [&](Real other) { return other != k3_; })) {
-    for (const Real own : k3) scale_.push_back(std::sqrt(own / k3_));
-  }
+  row_.clear();
+  for (const Real own : k3) row_.push_back(directed_ ? own / k3_ : std::sqrt(own / k3_));
+  if (!directed_ && std::any_of(k3.begin(), k3.end(), [&](Real other) { return other != k3_; })) scale_ = row_;
   gain_.resize(at(players_) * at(players_));
   seen_.clear();
   for (int i = 0; i < players_; ++i) {
-    for (int j = 0; j < players_; ++j) seen_.push_back(scale(i) * graph.weight(i, j));
+    for (int j = 0; j < players_; ++j) seen_.push_back(row_[at(i)] * graph.weight(i, j));
   }
   if (by_modes()) {
     find_modes(graph);
@@ -68,12 +69,15 @@ void EstimateBlocks::find_pattern(const CommunicationGraph& graph) {
   const std::vector<int>& order = elimination_.order;
   player_.clear();
   edge_.clear();
+  back_edge_.clear();
   degree_.clear();
   for (int k = 0; k < elimination_.listed; ++k) {
     for (int a = elimination_.start[at(k)]; a < elimination_.start[at(k + 1)]; ++a) {
       player_.push_back(order[at(elimination_.row[at(a)])]);
-      const int i = order[at(k)];
-      edge_.push_back(scale(i) * graph.weight(i, player_.back()) * scale(player_.back()));
+      const int i = player_.back();
+      const int h = order[at(k)];
+      edge_.push_back(row_[at(i)] * graph.weight(i, h) * scale(h));
+      if (directed_) back_edge_.push_back(row_[at(h)] * graph.weight(h, i));
     }
   }
   edge_.resize(at(elimination_.entries()));
@@ -86,10 +90,11 @@ void EstimateBlocks::find_pattern(const CommunicationGraph& graph) {
   for (int k = 0; k < n; ++k) {
     Real degree = 0.0;
     for (int i = 0; i < n; ++i) degree += graph.weight(order[at(k)], i);
-    degree_.push_back(scale(order[at(k)]) * degree * scale(order[at(k)]));
+    degree_.push_back(row_[at(order[at(k)])] * degree * scale(order[at(k)]));
   }
   const std::size_t padded = at((n + tile_length - 1) / tile_length * tile_length);
   lower_.resize(edge_.size() * padded);
+  upper_.resize(back_edge_.size() * padded);
   diagonal_.resize(at(n) * padded);
 }
 
@@ -114,6 +119,9 @@ void EstimateBlocks::factor_tiles(Real gamma_k3) {
     Real* diagonal = diagonal_.data() + first * n;
     for (std::size_t a = 0; a < edge_.size(); ++a)
       std::fill_n(lower + a * tile_length, tile_length, -gamma_k3 * edge_[a]);
+    Real* upper = upper_.data() + at(first) * back_edge_.size();
+    for (std::size_t a = 0; a < back_edge_.size(); ++a)
+      std::fill_n(upper + a * tile_length, tile_length, -gamma_k3 * back_edge_[a]);
     for (int k = 0; k < n; ++k) {
       Real* row = diagonal + k * tile_length;
       std::fill_n(row, tile_length, 1.0 + gamma_k3 * degree_[at(k)]);
@@ -121,9 +129,13 @@ void EstimateBlocks::factor_tiles(Real gamma_k3) {
         row[j - first] += scale(elimination_.order[at(k)]) * gain_[at(elimination_.order[at(k)] * n + j)];
       }
     }
-    kernels().factor_blocks(pattern(), lower, diagonal);
+    if (directed_) {
+      kernels().factor_directed_blocks(pattern(), lower, upper, diagonal);
+    } else {
+      kernels().factor_blocks(pattern(), lower, diagonal);
+    }
   }
-  kernels().solve_blocks(pattern(), 1, lower_.data(), diagonal_.data(), gain_.data());
+  solve_tiles(1, gain_.data());
 }
 
 void EstimateBlocks::solve(Real* rows) const {
@@ -134,9 +146,17 @@ void EstimateBlocks::solve(Real* rows) const {
   if (by_modes()) {
     kernels().solve_modes(modes(), inverse_.data(), rows);
   } else {
-    kernels().solve_blocks(pattern(), dimension_, lower_.data(), diagonal_.data(), rows);
+    solve_tiles(dimension_, rows);
   }
   scale_rows(dimension_, rows);
+}
+
+void EstimateBlocks::solve_tiles(int width, Real* rows) const {
+  if (directed_) {
+    kernels().solve_directed_blocks(pattern(), width, lower_.data(), upper_.data(), diagonal_.data(), rows);
+  } else {
+    kernels().solve_blocks(pattern(), width, lower_.data(), diagonal_.data(), rows);
+  }
 }
 
 /// S times the rows, of width * N entries.

@@ -7,7 +7,8 @@
 // a division for each.
 //
 // Where k3 differs from player to player, K3 = k3_1 S^2 with a diagonal S, and S^-1 B_j S is symmetric: the same
-// methods work on  I + gamma k3_1 S (L + diag(a_.j)) S  between two scalings of rows.
+// methods work on  I + gamma k3_1 S (L + diag(a_.j)) S  between two scalings of rows. Of a directed graph the blocks
+// are row dominant, whatever k3 is, and have an L U without pivoting.
 #pragma once
 
 #include <vector>
@@ -32,10 +33,11 @@ class EstimateBlocks {
   [[nodiscard]] const AlignedVector& shared_signal_gain() const { return gain_; }
 
  private:
-  [[nodiscard]] bool by_modes() const { return players_ <= most_players_by_modes; }
+  [[nodiscard]] bool by_modes() const { return players_ <= most_players_by_modes && !directed_; }
   void find_pattern(const CommunicationGraph& graph);
   void find_modes(const CommunicationGraph& graph);
   void factor_tiles(Real gamma_k3);
+  void solve_tiles(int width, Real* rows) const;
   void scale_rows(int width, Real* rows) const;
   [[nodiscard]] Real scale(int i) const { return scale_.empty() ? 1.0 : scale_[at(i)]; }
   [[nodiscard]] BlockPattern pattern() const {
@@ -53,18 +55,22 @@ class EstimateBlocks {
 
   int players_ = 0;
   int dimension_ = 0;
+  bool directed_ = false;
   Real k3_ = 0.0;            // of the first player
-  std::vector<Real> scale_;  // S; empty when k3 is the same for all
+  std::vector<Real> scale_;  // S; empty when k3 is the same for all, or the graph directed
+  std::vector<Real> row_;    // factor of each row of the graph: s_i, or k3_i / k3_1 of a directed one
   Real factored_ = 0.0;      // gamma k3_, or 0
-  AlignedVector seen_;       // s_i a_ij
+  AlignedVector seen_;       // row_i a_ij
   AlignedVector gain_;
   // by elimination
   BlockElimination elimination_;
   std::vector<int> player_;
   std::vector<int> target_;
-  AlignedVector edge_;    // s_i a_ik s_k of each entry's edge; 0 where elimination fills in
-  AlignedVector degree_;  // sum of each eliminated player's weights, times s_i^2
+  AlignedVector edge_;       // row_i a_ik s_k of each entry's edge; 0 where elimination fills in
+  AlignedVector back_edge_;  // of a directed graph, row_k a_ki
+  AlignedVector degree_;     // row_i s_i times the sum of each eliminated player's weights
   AlignedVector lower_;
+  AlignedVector upper_;  // of a directed graph
   AlignedVector diagonal_;
   // by modes
   AlignedVector vector_;

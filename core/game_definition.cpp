@@ -78,32 +78,6 @@ Strategy read_strategy(const TomlEntry& strategy) {
   return read;
 }
 
-RbfNetwork read_network(const TomlEntry& rbf, const Shape& shape) {
-  RbfNetwork network;
-  network.width = rbf["width"].positive();
-  network.W_max = rbf["W_max"].positive();
-  const TomlEntry centers = rbf["centers"];
-  network.diagonal = !centers.item(0).is_list();
-  const int n = shape.actions();
-  network.centers.resize(at(shape.neurons) * at(network.diagonal ? 1 : n));
-  for (int m = 0; m < shape.neurons; ++m) {
-    const TomlEntry center = centers.item(at(m));
-    if (network.diagonal) {
-      network.centers[at(m)] = center.number();
-      continue;
-    }
-    const std::string expected =
-        "a list of " + std::to_string(n) + " numbers, player by player, as the first center is a list";
-    if (center.length(expected) != at(n)) center.fail(expected);
-    for (int j = 0; j < shape.players; ++j) {
-      for (int l = 0; l < shape.dimension; ++l) {
-        network.centers[at(m * n + shape.entry(j, l))] = center.item(at(j * shape.dimension + l)).number();
-      }
-    }
-  }
-  return network;
-}
-
 std::string groups(const std::vector<std::vector<int>>& components) {
   constexpr std::size_t longest = 200;
   std::string text;
@@ -117,24 +91,31 @@ std::string groups(const std::vector<std::vector<int>>& components) {
 }
 
 CommunicationGraph read_graph(const TomlEntry& table, int players) {
-  table.accept_keys({"edges"});
-  CommunicationGraph graph(players);
+  table.accept_keys({"edges", "directed"});
+  const bool directed = table["directed"].present() && table["directed"].boolean();
+  CommunicationGraph graph(players, directed);
   const TomlEntry edges = table["edges"];
-  const std::size_t count = edges.length("a list of edges [i, j] or [i, j, weight]");
+  const std::string expected = directed ? "[from, to] or [from, to, weight]" : "[i, j] or [i, j, weight]";
+  const std::size_t count = edges.length("a list of edges " + expected);
   for (std::size_t k = 0; k < count; ++k) {
-    constexpr std::string_view expected = "an edge [i, j] or [i, j, weight]";
     const TomlEntry edge = edges.item(k);
-    const std::size_t length = edge.length(expected);
-    if (length != 2 && length != 3) edge.fail(expected);
-    const int i = edge.item(0).integer(1, players) - 1;
-    const int j = edge.item(1).integer(1, players) - 1;
-    if (i == j) edge.fail("an edge between two different players");
-    if (graph.weight(i, j) != 0.0) edge.fail("each edge once, in one of its directions");
-    graph.set_weight(i, j, length == 3 ? edge.item(2).positive() : 1.0);
+    const std::size_t length = edge.length("an edge " + expected);
+    if (length != 2 && length != 3) edge.fail("an edge " + expected);
+    const int from = edge.item(0).integer(1, players) - 1;
+    const int to = edge.item(1).integer(1, players) - 1;
+    if (from == to) edge.fail("an edge between two different players");
+    if (graph.weight(to, from) != 0.0)
+      edge.fail(directed ? "each edge once" : "each edge once, in one of its directions");
+    graph.set_weight(to, from, length == 3 ? edge.item(2).positive() : 1.0);
   }
   graph.refresh();
-  const auto components = graph.components();
-  if (components.size() > 1) {
+  const auto apart = graph.not_reached();
+  if (apart && directed) {
+    throw GameError(edges.path() + " lets nothing of player " + std::to_string(apart->first + 1) + " reach player " +
+                    std::to_string(apart->second + 1) + ", expected a strongly connected graph");
+  }
+  if (apart) {
+    const auto components = graph.components();
     throw GameError(edges.path() + " leaves the players in separate groups " + groups(components) +
                     ", expected a connected graph");
   }
@@ -199,8 +180,8 @@ void read_coefficients(const TomlEntry& table, int i, const Shape& shape, Coeffi
   }
 }
 
-constexpr std::string_view player_keys[] = {"name", "order", "gains", "x0",       "z0",
-                                            "v0",   "y0",    "cost",  "dynamics", "disturbance"};
+constexpr std::string_view player_keys[] = {"name", "order", "gains", "rbf",  "x0",       "z0",
+                                            "v0",   "y0",    "W0",    "cost", "dynamics", "disturbance"};
 
 /// A player's own table before the defaults, key by key.
 class PlayerTable {
@@ -218,6 +199,92 @@ class PlayerTable {
   TomlEntry own_;
   TomlEntry defaults_;
 };
+
+/// The q centers of one network: numbers, or rows of N D entries in the order of a joint action.
+struct Centers {
+  bool diagonal = true;
+  std::vector<Real> numbers;
+};
+
+Centers read_centers(const TomlEntry& centers, const Shape& shape) {
+  Centers read;
+  read.diagonal = !centers.item(0).is_list();
+  const int n = shape.actions();
+  read.numbers.resize(at(shape.neurons) * at(read.diagonal ? 1 : n));
+  for (int m = 0; m < shape.neurons; ++m) {
+    const TomlEntry center = centers.item(at(m));
+    if (read.diagonal) {
+      read.numbers[at(m)] = center.number();
+      continue;
+    }
+    const std::string expected =
+        "a list of " + std::to_string(n) + " numbers, player by player, as the first center is a list";
+    if (center.length(expected) != at(n)) center.fail(expected);
+    for (int j = 0; j < shape.players; ++j) {
+      for (int l = 0; l < shape.dimension; ++l) {
+        read.numbers[at(m * n + shape.entry(j, l))] = center.item(at(j * shape.dimension + l)).number();
+      }
+    }
+  }
+  return read;
+}
+
+// Each player's network: what its own table states, and otherwise what the game's does.
+RbfNetwork read_networks(const TomlEntry& rbf, const std::vector<PlayerTable>& players, const Shape& shape) {
+  const std::size_t q = at(shape.neurons);
+  const std::size_t n = at(shape.actions());
+  const Centers common = read_centers(rbf["centers"], shape);
+  RbfNetwork network;
+  network.width.assign(players.size(), rbf["width"].positive());
+  network.W_max.assign(players.size(), rbf["W_max"].positive());
+  std::vector<Centers> centers(players.size());  // those of their own
+  for (std::size_t i = 0; i < players.size(); ++i) {
+    const TomlEntry own = players[i]["rbf"];
+    own.accept_keys({"centers", "width", "W_max"});
+    if (own["width"].present()) network.width[i] = own["width"].positive();
+    if (own["W_max"].present()) network.W_max[i] = own["W_max"].positive();
+    if (own["centers"].present()) {
+      const std::string expected = "a list of " + std::to_string(q) + " centers, as rbf.centers is";
+      if (own["centers"].length(expected) != q) own["centers"].fail(expected);
+      centers[i] = read_centers(own["centers"], shape);
+    }
+    network.per_player = network.per_player || !own.keys("a table").empty();
+    network.diagonal = network.diagonal && centers[i].diagonal;
+  }
+  network.diagonal = network.diagonal && common.diagonal;
+  if (!network.diagonal && !network.per_player) {
+    network.centers = common.numbers;
+    return network;
+  }
+  if (!network.diagonal && q * players.size() * n > at(most_states)) {
+    rbf["centers"].fail("at most " + std::to_string(most_states) +
+                        " numbers in the centers of all players, which are " + std::to_string(q) + " vectors of " +
+                        std::to_string(n) + " numbers for each");
+  }
+  for (std::size_t m = 0; m < q; ++m) {
+    for (const Centers& stated : centers) {
+      const Centers& own = stated.numbers.empty() ? common : stated;
+      if (network.diagonal) {
+        network.centers.push_back(own.numbers[m]);
+      } else {
+        for (std::size_t k = 0; k < n; ++k) network.centers.push_back(own.numbers[own.diagonal ? m : m * n + k]);
+      }
+    }
+  }
+  return network;
+}
+
+// q numbers, each for every coordinate, or q rows of D numbers.
+void read_weights(const TomlEntry& W0, int i, const Shape& shape, InitialState& initial) {
+  if (!W0.present()) return;
+  const std::string expected = "a list of " + std::to_string(shape.neurons) + " numbers or of as many lists of " +
+                               std::to_string(shape.dimension) + " numbers";
+  if (W0.length(expected) != at(shape.neurons)) W0.fail(expected);
+  initial.W.resize(at(shape.neurons) * at(shape.actions()));
+  for (int m = 0; m < shape.neurons; ++m) {
+    W0.item(at(m)).numbers(shape.dimension, shape.players, &initial.W[at(m * shape.actions() + i)]);
+  }
+}
 
 bool is_x0(const TomlEntry& entry) {
   if (!entry.is_text()) return false;
@@ -296,16 +363,20 @@ std::vector<Real> read_guess(const TomlEntry& table, const Shape& shape, const I
 }
 
 // Number of variables when everything is exposed.
-std::int64_t variable_count(const Shape& shape, bool diagonal, bool gains_per_player) {
+std::int64_t variable_count(const Parameters& parameters) {
+  const Shape& shape = parameters.shape;
   const std::int64_t N = shape.players;
   const std::int64_t D = shape.dimension;
   const std::int64_t q = shape.neurons;
-  const std::int64_t gains = gains_per_player ? 6 * N : 7;  // k1 or k4, k2, k3, beta, delta, epsilon
-  const std::int64_t network = 2 + (diagonal ? q : 0);      // W_max, rho, center
-  const std::int64_t graph_and_cost = N * (N - 1) / 2 + N + N * D + N * (N - 1);
+  const std::int64_t gains = parameters.gains.per_player ? 6 * N : 7;  // k1 or k4, k2, k3, beta, delta, epsilon
+  const std::int64_t networks = parameters.rbf.per_player ? N : 1;
+  const std::int64_t network = networks * (2 + (parameters.rbf.diagonal ? q : 0));  // W_max, rho, center
+  const std::int64_t edges = N * (N - 1) / (parameters.graph.directed() ? 1 : 2);
+  const std::int64_t graph_and_cost = edges + N + N * D + N * (N - 1);
   const std::int64_t dynamics_and_disturbance = N + 4 * N * D;
-  const std::int64_t switches = 3;                           // robust, perturbed, allow_disconnected
-  const std::int64_t initial_state = 2 * N * D + N * N * D;  // x0, z0 or v0, y0
+  const std::int64_t switches = 3;  // robust, perturbed, allow_disconnected
+  const std::int64_t W0 = static_cast<std::int64_t>(parameters.initial.W.size());
+  const std::int64_t initial_state = 2 * N * D + N * N * D + W0;  // x0, z0 or v0, y0
   const std::int64_t tolerances = 2;
   const std::int64_t states = (2 + N + q) * N * D;  // x, z or v, y, W
   const std::int64_t signals = 6 * N * D + N;       // d_ext, u, x_star, W_norm2, phi, nn, cost
@@ -315,8 +386,7 @@ std::int64_t variable_count(const Shape& shape, bool diagonal, bool gains_per_pl
 }
 
 Expose read_expose(const TomlEntry& expose, const Parameters& parameters) {
-  const std::int64_t variables = variable_count(parameters.shape, parameters.rbf.diagonal, parameters.gains.per_player);
-  if (!expose.present()) return variables <= most_exposed ? Expose::all : Expose::outputs;
+  if (!expose.present()) return variable_count(parameters) <= most_exposed ? Expose::all : Expose::outputs;
   const std::string text = expose.text();
   if (text != "all" && text != "outputs") expose.fail("\"all\" or \"outputs\"");
   return text == "all" ? Expose::all : Expose::outputs;
@@ -395,7 +465,10 @@ Game parse_game(std::string_view toml) {
     expressions.add_coordinates(player["dynamics"]["expression"], Purpose::dynamics, i, dynamics_values);
     expressions.add_coordinates(player["disturbance"]["expression"], Purpose::disturbance, i, disturbance_values);
   }
-  for (int i = 0; i < shape.players; ++i) read_estimates(players[at(i)]["y0"], i, shape, initial);
+  for (int i = 0; i < shape.players; ++i) {
+    read_estimates(players[at(i)]["y0"], i, shape, initial);
+    read_weights(players[at(i)]["W0"], i, shape, initial);
+  }
   dynamics_values.compile();
   disturbance_values.compile();
   cost.coefficients.named = dynamics.coefficients.named = disturbance.coefficients.named = named.values;
@@ -407,7 +480,7 @@ Game parse_game(std::string_view toml) {
             .parameters = {.shape = shape,
                            .gains = std::move(gains),
                            .strategy = read_strategy(game["strategy"]),
-                           .rbf = read_network(rbf, shape),
+                           .rbf = read_networks(rbf, players, shape),
                            .graph = read_graph(game["graph"], shape.players),
                            .cost = family_of<Cost, ExpressionCost>(std::move(cost), has_any(costs), shape, costs),
                            .dynamics = family_of<UnknownDynamics, ExpressionDynamics>(
@@ -419,6 +492,7 @@ Game parse_game(std::string_view toml) {
   read.parameters.guess = read_guess(game["equilibrium"], shape, read.parameters.initial);
   read.expose = read_expose(game["expose"], read.parameters);
   read.parameters.refresh();
+  require_bounded_weights(read.parameters);
   nash_equilibrium(*read.parameters.cost, shape, read.parameters.guess);  // throws when it is not unique
   return read;
 }

@@ -325,8 +325,8 @@ void Integrator::Implementation::begin_at_restart_point() {
 void Integrator::Implementation::settle(Real* state) {
   if (!loop_.parameters().strategy.robust) return;
   loop_.weight_norms(state, norm2_.data());
-  for (const Real norm2 : norm2_) {
-    largest_raw_excess_ = std::max(largest_raw_excess_, norm2 / loop_.parameters().rbf.W_max - 1.0);
+  for (std::size_t p = 0; p < norm2_.size(); ++p) {
+    largest_raw_excess_ = std::max(largest_raw_excess_, norm2_[p] / loop_.gains().W_max[p] - 1.0);
   }
   loop_.project(modes_, signals_, state);
 }

@@ -45,7 +45,7 @@ void LoopJacobian::linearize(const Real* state, const Signals& signals, const Mo
   std::copy(signals.activation.begin(), signals.activation.end(), activation.begin());
   for (std::size_t p = 0; p < slope.size(); ++p) {
     slope[p] = loop_->robust_term_slope(p, signals.robust[p]);
-    inverse_bound[p] = modes[p] != 0 && error[p] * network[p] >= 0.0 ? 1.0 / parameters.rbf.W_max : 0.0;
+    inverse_bound[p] = modes[p] != 0 && error[p] * network[p] >= 0.0 ? 1.0 / loop_->gains().W_max[p] : 0.0;
   }
 }
 

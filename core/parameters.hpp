@@ -21,17 +21,23 @@ struct Strategy {
 };
 
 struct RbfNetwork {
-  bool diagonal = true;       ///< centre m is c_m (1, ..., 1)
-  std::vector<Real> centers;  ///< q numbers c_m, or q rows of N D entries in the order of a joint action
-  Real width = 0.0;           ///< rho
-  Real W_max = 0.0;           ///< bound of w'w for each weight column
+  bool per_player = false;  ///< a player states a network of its own; otherwise all players have the same
+  bool diagonal = true;     ///< centre m is c_m (1, ..., 1)
+  std::vector<Real>
+      centers;              ///< numbers c_m at m N + i, or rows of N D entries in the order of a joint action, see row
+  std::vector<Real> width;  ///< rho, by player
+  std::vector<Real> W_max;  ///< bound of w'w for each weight column, by player
+
+  /// Number of the row that is centre m of player i.
+  [[nodiscard]] std::size_t row(int m, int i) const { return per_player ? at(m) * width.size() + at(i) : at(m); }
 };
 
-/// Initial state; the weights start at zero.
+/// Initial state.
 struct InitialState {
   std::vector<Real> x;          ///< entry(i, l)
   std::vector<Real> reference;  ///< z0 (order 1) or v0 (order 2) at entry(i, l)
   std::vector<Real> y;          ///< i * N D + entry(j, l)
+  std::vector<Real> W = {};     ///< m * N D + entry(i, l); empty: zero
 };
 
 struct Parameters {
@@ -55,11 +61,10 @@ struct Parameters {
   [[nodiscard]] Parameters zero_direction() const {
     Parameters zero = *this;
     for (const auto member : Gains::members()) (zero.gains.*member).assign(at(shape.players), 0.0);
-    zero.rbf.width = zero.rbf.W_max = 0.0;
-    zero.graph = CommunicationGraph(shape.players);
+    zero.graph = CommunicationGraph(shape.players, graph.directed());
     for (GameFamily* family : zero.families()) family->coefficients.set_all_to_zero();
-    for (std::vector<Real>* values :
-         {&zero.rbf.centers, &zero.initial.x, &zero.initial.reference, &zero.initial.y, &zero.named.values}) {
+    for (std::vector<Real>* values : {&zero.rbf.centers, &zero.rbf.width, &zero.rbf.W_max, &zero.initial.x,
+                                      &zero.initial.reference, &zero.initial.y, &zero.initial.W, &zero.named.values}) {
       values->assign(values->size(), 0.0);
     }
     return zero;
@@ -74,5 +79,8 @@ struct Parameters {
     }
   }
 };
+
+/// Throws GameError when an initial weight column is longer than its bound allows.
+void require_bounded_weights(const Parameters& parameters);
 
 }  // namespace mixed_order_game

@@ -147,6 +147,9 @@ class Analysis {
     for (int k = 0; k < shape_.players * n_; ++k) {
       state_[at(layout.estimates() + k)] = knowns_.parameter("y0", k, initial.y[at(k)]);
     }
+    for (int k = 0; k < static_cast<int>(initial.W.size()); ++k) {
+      state_[at(layout.weights() + k)] = knowns_.parameter("W0", k, initial.W[at(k)]);
+    }
   }
 
   LoopNumbers<Dependencies> loop_numbers(const std::vector<KnownCoefficients>& coefficients) const {
@@ -162,16 +165,21 @@ class Analysis {
     }
     numbers.robust = knowns_.parameter("robust", 0, 1.0);
     numbers.perturbed = knowns_.parameter("perturbed", 0, 1.0);
-    numbers.width = knowns_.parameter("rho", 0, rbf.width);
-    numbers.W_max = knowns_.parameter("W_max", 0, rbf.W_max);
-    for (std::size_t m = 0; m < rbf.centers.size(); ++m) {
-      numbers.centers.push_back(knowns_.parameter("center", static_cast<int>(m), rbf.centers[m]));
+    for (int i = 0; i < shape_.players; ++i) {
+      const int slot = rbf.per_player ? i : 0;
+      numbers.width.push_back(knowns_.parameter("rho", slot, rbf.width[at(i)]));
+      numbers.W_max.push_back(knowns_.parameter("W_max", slot, rbf.W_max[at(i)]));
+    }
+    for (std::size_t k = 0; k < rbf.centers.size(); ++k) {
+      const int slot = static_cast<int>(k);
+      const int first = rbf.per_player ? slot : slot - slot % shape_.players;
+      numbers.centers.push_back(rbf.diagonal ? knowns_.parameter("center", first, rbf.centers[k])
+                                             : Dependencies(rbf.centers[k]));
     }
     for (int i = 0; i < shape_.players; ++i) {
       auto& row = numbers.edges.emplace_back();
       for (int k = 0; k < shape_.players; ++k) {
-        const Dependencies weight =
-            knowns_.parameter("a", std::min(i, k) * shape_.players + std::max(i, k), parameters_.graph.weight(i, k));
+        const Dependencies weight = knowns_.parameter("a", edge_slot(i, k), parameters_.graph.weight(i, k));
         if (weight.number() != 0.0) row.push_back({k, weight});
       }
     }
@@ -179,6 +187,12 @@ class Analysis {
     numbers.dynamics = &coefficients[1];
     numbers.disturbance = &coefficients[2];
     return numbers;
+  }
+
+  /// Where a_ik is a variable.
+  int edge_slot(int i, int k) const {
+    if (parameters_.graph.directed()) return i * shape_.players + k;
+    return std::min(i, k) * shape_.players + std::max(i, k);
   }
 
   // What grad_il f_i depends on at an x of its own, whose entries count as known with references past all others.

@@ -54,13 +54,14 @@ struct Kernels {
                    const double* bias, double* d);
 
   // closed loop; n = N D entries in a row
-  /// S_m(y_i) for centres c_m (1, ..., 1): activation[m * n + entry(i, l)], equal for every l.
-  /// exponent is scratch of N (q + 2) + 8 numbers.
-  void (*activations_diagonal)(int players, int dimension, int neurons, const double* centers, double width,
+  /// S_m(y_i) for centres c_m (1, ..., 1) at m * N + i: activation[m * n + entry(i, l)], equal for every l; sharpness
+  /// is 1 / rho_i^2. exponent is scratch of N (q + 2) + 8 numbers.
+  void (*activations_diagonal)(int players, int dimension, int neurons, const double* centers, const double* sharpness,
                                const double* y, double* exponent, double* activation);
-  /// The same for centres that are vectors: center m is the row centers + m * n.
-  void (*activations_general)(int players, int dimension, int neurons, const double* centers, double width,
-                              const double* y, double* exponent, double* activation);
+  /// The same for centres that are vectors, `owners` of each m: centre m of player i is the row m * owners + i of N D
+  /// numbers, or row m of all players when there is one.
+  void (*activations_general)(int players, int dimension, int neurons, int owners, const double* centers,
+                              const double* sharpness, const double* y, double* exponent, double* activation);
   /// y_ij' = -k3_i (sum_k a_ik (y_ij - y_kj) + a_ij (y_ij - xbar_j))
   void (*estimate_rates)(int players, int dimension, NeighbourRows graph, const double* k3, const double* y,
                          const double* xbar, double* rate);
@@ -80,6 +81,10 @@ struct Kernels {
   /// Solves all blocks for right-hand sides of `width` coordinates, in place: rows of width * N entries.
   void (*solve_blocks)(BlockPattern pattern, int width, const double* lower, const double* inverse_diagonal,
                        double* rhs);
+  /// The same for directed graphs, by L U: U has the pattern of L' and lies as L does, and no column is full.
+  void (*factor_directed_blocks)(BlockPattern pattern, double* lower, double* upper, double* diagonal);
+  void (*solve_directed_blocks)(BlockPattern pattern, int width, const double* lower, const double* upper,
+                                const double* inverse_diagonal, double* rhs);
   /// inverse (N rows of n) = 1 / (1 + gamma k3 eigenvalue); gain[i * N + j] as in EstimateBlocks.
   void (*factor_modes)(BlockModes modes, double gamma_k3, double* inverse, double* gain);
   /// Solves all blocks, in place: N rows of n.

@@ -26,6 +26,7 @@ namespace {
 #include "adaptation.ipp"
 #include "full_columns.ipp"
 #include "estimate_blocks.ipp"
+#include "directed_blocks.ipp"
 #include "estimate_modes.ipp"
 #include "vector_operations.ipp"
 #include "nordsieck.ipp"
@@ -48,6 +49,8 @@ const Kernels MIXED_ORDER_GAME_JOIN(kernels_, MIXED_ORDER_GAME_LEVEL) = {
     run_tape,
     factor_blocks,
     solve_blocks,
+    factor_directed_blocks,
+    solve_directed_blocks,
     factor_modes,
     solve_modes,
     add_shared_signal,

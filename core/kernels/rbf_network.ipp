@@ -17,10 +17,10 @@ inline void exponentiate_and_repeat(int players, int dimension, int neurons, dou
   });
 }
 
-void activations_diagonal(int players, int dimension, int neurons, const double* centers, double width, const double* y,
-                          double* exponent, double* activation) {
+void activations_diagonal(int players, int dimension, int neurons, const double* centers, const double* sharpness,
+                          const double* y, double* exponent, double* activation) {
   const int n = players * dimension;
-  const double scale = 1.0 / (width * width);
+  const double count = n;
   double* sum = exponent + players * neurons + vector_length;
   double* squares = sum + players;
   for (int i = 0; i < players; ++i) moments(n, y + i * n, sum + i, squares + i);
@@ -28,23 +28,24 @@ void activations_diagonal(int players, int dimension, int neurons, const double*
     using Width = decltype(lanes);
     for (int m = 0; m < neurons; ++m) {
       // -sum (y - c)^2 / rho^2 = (2 c sum y - sum y^2 - n c^2) / rho^2
-      const double twice = 2.0 * centers[m];
-      const double constant = n * centers[m] * centers[m];
+      const double* center = centers + m * players;
       set_row_by(lanes, players, exponent + m * players, [=](auto, Index i) {
-        return ((twice * load_as<Width>(sum + i) - load_as<Width>(squares + i)) - constant) * scale;
+        const Width c = load_as<Width>(center + i);
+        return (((2.0 * c) * load_as<Width>(sum + i) - load_as<Width>(squares + i)) - (count * c) * c) *
+               load_as<Width>(sharpness + i);
       });
     }
   });
   exponentiate_and_repeat(players, dimension, neurons, exponent, activation);
 }
 
-void activations_general(int players, int dimension, int neurons, const double* centers, double width, const double* y,
-                         double* exponent, double* activation) {
+void activations_general(int players, int dimension, int neurons, int owners, const double* centers,
+                         const double* sharpness, const double* y, double* exponent, double* activation) {
   const int n = players * dimension;
-  const double scale = 1.0 / (width * width);
   for (int i = 0; i < players; ++i) {
     for (int m = 0; m < neurons; ++m) {
-      exponent[m * players + i] = -distance_squared(n, y + i * n, centers + m * n) * scale;
+      const double* center = centers + static_cast<Index>(m * owners + (owners == 1 ? 0 : i)) * n;
+      exponent[m * players + i] = -distance_squared(n, y + i * n, center) * sharpness[i];
     }
   }
   exponentiate_and_repeat(players, dimension, neurons, exponent, activation);

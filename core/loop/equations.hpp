@@ -16,7 +16,7 @@ struct LoopNumbers {
 
   GainsAs<Scalar> gains;
   Scalar robust, perturbed;
-  Scalar width, W_max;
+  std::vector<Scalar> width, W_max;      ///< by player
   std::vector<Scalar> centers;           ///< as in RbfNetwork
   std::vector<std::vector<Edge>> edges;  ///< row i: a_ik
   const CoefficientsAs<Scalar>* cost = nullptr;
@@ -70,8 +70,11 @@ void LoopEquations<Scalar>::evaluate_control(const LoopNumbers<Scalar>& number, 
     for (int m = 0; m < shape.neurons; ++m) {
       activation[at(m * shape.players + i)] = terms::activation(
           n, y + i * n,
-          [&](int k) -> const Scalar& { return number.centers[at(parameters_.rbf.diagonal ? m : m * n + k)]; },
-          number.width);
+          [&](int k) -> const Scalar& {
+            const RbfNetwork& rbf = parameters_.rbf;
+            return number.centers[rbf.diagonal ? at(m * shape.players + i) : rbf.row(m, i) * at(n) + at(k)];
+          },
+          number.width[at(i)]);
     }
   }
   for (int p = 0; p < n; ++p) {
@@ -109,7 +112,7 @@ void LoopEquations<Scalar>::evaluate_rates(const LoopNumbers<Scalar>& number, co
     rate[layout.reference() + p] = second ? driven : terms::reference_rate(gains.k2[at(i)], gradient[at(p)]);
 
     const bool on_sphere = modes[at(p)] != 0 && is_outward(error[at(p)], network[at(p)]);
-    const Scalar r = on_sphere ? network[at(p)] / number.W_max : Scalar(0.0);
+    const Scalar r = on_sphere ? network[at(p)] / number.W_max[at(i)] : Scalar(0.0);
     for (int m = 0; m < shape.neurons; ++m) {
       const int w = layout.weights_of(m) + p;
       rate[w] = number.robust *

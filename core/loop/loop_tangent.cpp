@@ -15,6 +15,8 @@ LoopTangent::LoopTangent(const ClosedLoop& loop)
       d_ext_(d_ext.size()),
       rate_(state.size()) {
   for (const auto member : GainsAs<Dual>::members()) (numbers_.gains.*member).resize(at(loop.shape().players));
+  numbers_.width.resize(at(loop.shape().players));
+  numbers_.W_max.resize(at(loop.shape().players));
   numbers_.centers.resize(loop.parameters().rbf.centers.size());
   const NeighbourRows neighbours = loop.parameters().graph.neighbours();
   for (int i = 0; i < loop.shape().players; ++i) {
@@ -37,23 +39,20 @@ void LoopTangent::follow_parameters(const Parameters& direction, Real t, const R
 
 void LoopTangent::evaluate(const Parameters* direction, Real t, const Real* at_state, const Modes& modes) {
   const Parameters& parameters = loop_->parameters();
-  const auto with = [&](auto part, auto member) {
-    return Dual((parameters.*part).*member, direction == nullptr ? 0.0 : (direction->*part).*member);
+  const auto set = [&](std::vector<Dual>& numbers, auto part, auto member) {
+    const std::vector<Real>& values = (parameters.*part).*member;
+    for (std::size_t k = 0; k < numbers.size(); ++k) {
+      numbers[k] = {values[k], direction == nullptr ? 0.0 : ((direction->*part).*member)[k]};
+    }
   };
   for (std::size_t k = 0; k < declared_gains.size(); ++k) {
-    std::vector<Dual>& gains = numbers_.gains.*GainsAs<Dual>::members()[k];
-    const auto own = Gains::members()[k];
-    for (std::size_t i = 0; i < gains.size(); ++i) {
-      gains[i] = {(parameters.gains.*own)[i], direction == nullptr ? 0.0 : (direction->gains.*own)[i]};
-    }
+    set(numbers_.gains.*GainsAs<Dual>::members()[k], &Parameters::gains, Gains::members()[k]);
   }
+  set(numbers_.width, &Parameters::rbf, &RbfNetwork::width);
+  set(numbers_.W_max, &Parameters::rbf, &RbfNetwork::W_max);
+  set(numbers_.centers, &Parameters::rbf, &RbfNetwork::centers);
   numbers_.robust = parameters.strategy.robust ? 1.0 : 0.0;
   numbers_.perturbed = parameters.strategy.perturbed ? 1.0 : 0.0;
-  numbers_.width = with(&Parameters::rbf, &RbfNetwork::width);
-  numbers_.W_max = with(&Parameters::rbf, &RbfNetwork::W_max);
-  for (std::size_t k = 0; k < numbers_.centers.size(); ++k) {
-    numbers_.centers[k] = {parameters.rbf.centers[k], direction == nullptr ? 0.0 : direction->rbf.centers[k]};
-  }
   for (int i = 0; i < loop_->shape().players; ++i) {
     auto& row = numbers_.edges[at(i)];
     row.clear();

@@ -361,11 +361,18 @@ Tolerances Instance::tolerances() const {
 /// What involves several values, so that it can be judged only once all are set.
 void Instance::check_settings() {
   const CommunicationGraph& graph = settings_.parameters.graph;
-  if (!settings_.allow_disconnected && graph.components().size() > 1) {
+  const auto apart = graph.not_reached();
+  if (!settings_.allow_disconnected && apart && graph.directed()) {
+    throw Error("by the weights a[i,j] nothing of player " + std::to_string(apart->first + 1) + " reaches player " +
+                std::to_string(apart->second + 1) +
+                ", expected a strongly connected graph, or allow_disconnected = true");
+  }
+  if (!settings_.allow_disconnected && apart) {
     throw Error("the weights a[i,j] leave the players in separate groups " + groups(graph) +
                 ", expected a connected graph, or allow_disconnected = true");
   }
   require_moderate_factors(graph);
+  require_bounded_weights(settings_.parameters);
   evaluation_.prepare_equilibrium(settings_);
 }
 

@@ -298,33 +298,50 @@ class ModelVariables::Builder {
   }
 
   void add_network() {
-    Family W_max = parameter("W_max", "Bound of the squared norm of each weight column", Variability::fixed);
-    W_max.range = Range::positive;
-    W_max.read = [](const View& view, int) { return view.settings->parameters.rbf.W_max; };
-    W_max.write = [](Settings& settings, int, Real value) { settings.parameters.rbf.W_max = value; };
-    add(std::move(W_max), one());
+    const bool per_player = game_.parameters.rbf.per_player;
+    // one number of each player, or one for all of them
+    const auto add_of_players = [&](Family family, std::vector<Real> RbfNetwork::* values) {
+      family.range = Range::positive;
+      family.read = [=](const View& view, int i) { return (view.settings->parameters.rbf.*values)[at(i)]; };
+      family.write = [=](Settings& settings, int i, Real value) {
+        std::vector<Real>& numbers = settings.parameters.rbf.*values;
+        const auto first = numbers.begin() + i;
+        std::fill(first, per_player ? first + 1 : numbers.end(), value);
+      };
+      add(std::move(family), per_player ? players() : one());
+    };
+    add_of_players(parameter("W_max", "Bound of the squared norm of each weight column", Variability::fixed),
+                   &RbfNetwork::W_max);
 
     Family rho = parameter("rho", "Width of the radial basis functions", Variability::fixed);
     rho.declared_type = "Action";
     rho.unit = {"1", "1"};
-    rho.range = Range::positive;
-    rho.read = [](const View& view, int) { return view.settings->parameters.rbf.width; };
-    rho.write = [](Settings& settings, int, Real value) { settings.parameters.rbf.width = value; };
-    add(std::move(rho), one());
+    add_of_players(std::move(rho), &RbfNetwork::width);
 
     if (!game_.parameters.rbf.diagonal) return;
     Family center = parameter("center", "Every entry of the center of neuron m", Variability::fixed);
     center.declared_type = "Action";
     center.unit = {"1", "1"};
-    center.read = [](const View& view, int m) { return view.settings->parameters.rbf.centers[at(m)]; };
-    center.write = [](Settings& settings, int m, Real value) { settings.parameters.rbf.centers[at(m)] = value; };
-    Elements neurons;
-    for (int m = 0; m < shape_.neurons; ++m) neurons.push_back({m, {m + 1}});
-    add(std::move(center), neurons);
+    const int N = shape_.players;
+    center.read = [](const View& view, int slot) { return view.settings->parameters.rbf.centers[at(slot)]; };
+    center.write = [=](Settings& settings, int slot, Real value) {
+      const auto first = settings.parameters.rbf.centers.begin() + slot;
+      std::fill_n(first, per_player ? 1 : N, value);
+    };
+    Elements centers;
+    for (int i = 0; i < (per_player ? N : 1); ++i) {
+      for (int m = 0; m < shape_.neurons; ++m) {
+        centers.push_back({m * N + i, per_player ? Index{i + 1, m + 1} : Index{m + 1}});
+      }
+    }
+    add(std::move(center), centers);
   }
 
   void add_graph() {
-    Family family = parameter("a", "Weight of the edge between players i and j", Variability::tunable);
+    const bool directed = game_.parameters.graph.directed();
+    Family family = parameter(
+        "a", directed ? "Weight with which player i hears player j" : "Weight of the edge between players i and j",
+        Variability::tunable);
     family.declared_type = "EdgeWeight";
     family.unit = {"1", "1"};
     family.range = Range::non_negative;
@@ -338,7 +355,8 @@ class ModelVariables::Builder {
     };
     Elements pairs;
     for (int i = 0; i < shape_.players; ++i) {
-      for (int j = i + 1; j < shape_.players; ++j) {
+      for (int j = directed ? 0 : i + 1; j < shape_.players; ++j) {
+        if (j == i) continue;
         if (!everything() && game_.parameters.graph.weight(i, j) == 0.0) continue;
         pairs.push_back({i * shape_.players + j, {i + 1, j + 1}});
       }
@@ -376,6 +394,11 @@ class ModelVariables::Builder {
     if (everything()) {
       add_initial<&InitialState::y>("y0", "Initial estimate by player i of the action of player j", "Action", "1",
                                     estimates());
+      if (!game_.parameters.initial.W.empty()) {
+        add_initial<&InitialState::W>("W0", "Initial network weight of player i, neuron m, coordinate l", "Weight",
+                                      nullptr, weights());
+        table_.families_.back().unit = drive;
+      }
     }
   }
 
@@ -472,7 +495,8 @@ class ModelVariables::Builder {
   }
 
   void add_inside_of_the_loop() {
-    const Real W_nominal = std::sqrt(game_.parameters.rbf.W_max);
+    const std::vector<Real>& W_max = game_.parameters.rbf.W_max;
+    const Real W_nominal = std::sqrt(*std::max_element(W_max.begin(), W_max.end()));
     add({.name = "z",
          .description = "Reference of a player of order 1",
          .declared_type = "Action",

@@ -47,7 +47,7 @@ namespace {
 TEST(Allocation, NoneAfterTheStart) {
   for (const testing::Recipe& recipe : testing::assorted_recipes()) {
     testing::PlainGame game = testing::random_game(recipe);
-    game.W_max = 1.0;  // the sphere is reached and left
+    game.W_max = testing::everyone(game, 1.0);  // the sphere is reached and left
     ClosedLoop loop(parse_game(testing::toml_of(game)).parameters);
     ExternalDisturbance input(loop.shape().actions());
     Integrator integrator(loop, input, make_structured_newton());

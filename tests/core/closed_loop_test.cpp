@@ -92,6 +92,7 @@ TEST_P(ClosedLoopOfRandomGame, InitialStateIsThatOfTheDefinition) {
   expected.x = game_.x0;
   expected.reference = game_.reference0;
   expected.y = game_.y0;
+  if (!game_.W0.empty()) expected.W = game_.W0;
   std::vector<Real> state(at(loop_.layout().size()), 12345.0);
   loop_.initial_state(state.data());
   EXPECT_EQ(state, expected.flat());
@@ -133,7 +134,7 @@ TEST_P(ClosedLoopOfRandomGame, OnTheSphereTheNormNeverGrows) {
       }
       const std::size_t p = l * game_.players + i;
       const Real inward = std::min(0.0, 2.0 * game_.beta[i] * signals.error[p] * signals.network[p]);
-      EXPECT_NEAR(growth, inward, 1e-12 * size + 1e-10 * game_.W_max) << i << ' ' << l;
+      EXPECT_NEAR(growth, inward, 1e-12 * size + 1e-10 * game_.W_max[i]) << i << ' ' << l;
     }
   }
 }
@@ -169,8 +170,8 @@ TEST_P(ClosedLoopOfRandomGame, EventFunctionsBelongToTheirStateWhateverTheSignal
   constexpr Real tolerance = 1e-4;
   loop_.event_functions(state.flat().data(), modes, tolerance, signals, values.data());
   for (std::size_t p = 0; p < modes.size(); ++p) {
-    const Real height = norm2[p] / game_.W_max - 1.0;
-    const Real falling = -2.0 * game_.beta[p % game_.players] * error[p] * network[p] / game_.W_max;
+    const Real height = norm2[p] / game_.W_max[p % game_.players] - 1.0;
+    const Real falling = -2.0 * game_.beta[p % game_.players] * error[p] * network[p] / game_.W_max[p % game_.players];
     const Real value = modes[p] != 0 ? std::min(-tolerance - height, falling) : height;
     EXPECT_NEAR(values[p], value, 2e-12 * (1.0 + std::abs(value))) << "column " << p;
   }
@@ -184,7 +185,7 @@ class TwoScalarPlayers : public ::testing::Test {
  protected:
   static PlainGame plain() {
     PlainGame game = random_game({.seed = 77, .players = 2, .dimension = 1, .neurons = 1, .order = {1, 2}});
-    game.W_max = 4.0;
+    game.W_max = testing::everyone(game, 4.0);
     return game;
   }
   PlainGame game_ = plain();
@@ -271,7 +272,7 @@ TEST(ProjectedState, LiesOnTheSphereOrInsideIt) {
   const Rows outward = {{-1.0, 1.0, 1.0}, {1.0, 1.0, -1.0}};
   for (std::size_t i = 0; i < 2; ++i) {
     for (std::size_t l = 0; l < 3; ++l) {
-      const Real factor = std::sqrt(wanted[i][l] * game.W_max / norm2(before, i, l));
+      const Real factor = std::sqrt(wanted[i][l] * game.W_max[i] / norm2(before, i, l));
       for (auto& row : before.W[i]) row[l] = std::fabs(factor * row[l]);  // so that w'S > 0
       before.x[i][l] = before.reference[i][l] + outward[i][l];
     }
@@ -288,13 +289,25 @@ TEST(ProjectedState, LiesOnTheSphereOrInsideIt) {
   const Rows expected = {{1.0, 1.0, 1.0}, {0.0, 0.3, 0.98}};
   for (std::size_t i = 0; i < 2; ++i) {
     for (std::size_t l = 0; l < 3; ++l) {
-      EXPECT_NEAR(norm2(after, i, l), expected[i][l] * game.W_max, 1e-14 * game.W_max) << i << ' ' << l;
+      EXPECT_NEAR(norm2(after, i, l), expected[i][l] * game.W_max[i], 1e-14 * game.W_max[i]) << i << ' ' << l;
       const Real factor = wanted[i][l] > 0.0 ? std::sqrt(expected[i][l] / wanted[i][l]) : 1.0;
       for (std::size_t m = 0; m < 4; ++m) {
         EXPECT_NEAR(after.W[i][m][l], factor * before.W[i][m][l], 1e-14 * before.W[i][m][l]) << i << ' ' << l;
       }
     }
   }
+}
+
+TEST(ClosedLoop, InitialWeightsAreScaledOntoTheSphere) {
+  PlainGame game = random_game({.seed = 51, .players = 3, .dimension = 2, .neurons = 4, .initial_weights = true});
+  game.W_max = everyone(game, 7.0);
+  for (std::size_t m = 0; m < 4; ++m) game.W0[1][m][1] = 0.5 * std::sqrt(7.0 * (1.0 + 9e-10));
+  const ClosedLoop loop(parse_game(toml_of(game)).parameters);
+  std::vector<Real> state(at(loop.layout().size())), norm2(6);
+  loop.initial_state(state.data());
+  loop.weight_norms(state.data(), norm2.data());
+  EXPECT_NEAR(norm2[1 * 3 + 1], 7.0, 1e-14);
+  EXPECT_EQ(state[at(loop.layout().weights_of(2) + 0)], game.W0[0][2][0]);
 }
 
 }  // namespace

@@ -57,5 +57,22 @@ TEST(CommunicationGraph, ComponentsAreSortedGroups) {
   EXPECT_EQ(graph.components(), (Components{{0, 1, 2, 3}}));
 }
 
+TEST(CommunicationGraph, DirectedOnesHearOneWay) {
+  CommunicationGraph graph(3, true);
+  graph.set_weight(0, 2, 1.5);  // 2 -> 0 -> 1
+  graph.set_weight(1, 0, 0.5);
+  graph.refresh();
+  EXPECT_EQ(graph.weight(2, 0), 0.0);
+  const NeighbourRows rows = graph.neighbours();
+  EXPECT_EQ(std::vector<int>(rows.start, rows.start + 4), (std::vector<int>{0, 1, 2, 2}));
+  EXPECT_EQ(graph.edges(), (Edges{{0, 1}, {0, 2}}));
+  EXPECT_EQ(graph.not_reached(), std::pair(0, 2));
+  graph.set_weight(2, 1, 1.0);
+  EXPECT_EQ(graph.not_reached(), std::nullopt);
+  graph.set_weight(0, 2, 0.0);  // 0 -> 1 -> 2
+  EXPECT_EQ(graph.not_reached(), std::pair(1, 0));
+  EXPECT_EQ(path_and_loner().not_reached(), std::pair(0, 2));
+}
+
 }  // namespace
 }  // namespace mixed_order_game

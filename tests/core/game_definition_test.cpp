@@ -97,9 +97,9 @@ TEST(GameDefinition, NumbersLandWhereTheCoreExpectsThem) {
   EXPECT_TRUE(p.strategy.robust);
   EXPECT_TRUE(p.strategy.perturbed);
   EXPECT_TRUE(p.rbf.diagonal);
-  EXPECT_EQ(p.rbf.centers, (std::vector<Real>{-1.0, 0.0, 1.0, 2.5}));
-  EXPECT_EQ(p.rbf.width, 2.0);
-  EXPECT_EQ(p.rbf.W_max, 50.0);
+  EXPECT_EQ(p.rbf.centers, (std::vector<Real>{-1.0, -1.0, -1.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 2.5, 2.5, 2.5}));
+  EXPECT_EQ(p.rbf.width, std::vector<Real>(3, 2.0));
+  EXPECT_EQ(p.rbf.W_max, std::vector<Real>(3, 50.0));
   EXPECT_EQ(p.graph.weight(0, 1), 1.0);
   EXPECT_EQ(p.graph.weight(2, 1), 0.5);
   EXPECT_EQ(p.graph.weight(0, 2), 0.0);
@@ -148,6 +148,53 @@ TEST(GameDefinition, PlayersHaveGainsOfTheirOwn) {
   EXPECT_EQ(mixed.k3, (std::vector<Real>{50.0, 7.0, 50.0}));
 }
 
+TEST(GameDefinition, PlayersHaveNetworksOfTheirOwn) {
+  const RbfNetwork own =
+      parse_game(edited("v0 = -1", "v0 = -1\nrbf = { W_max = 3, centers = [4, 5.0, 6, 7] }")).parameters.rbf;
+  EXPECT_TRUE(own.per_player);
+  EXPECT_TRUE(own.diagonal);
+  EXPECT_EQ(own.W_max, (std::vector<Real>{50.0, 3.0, 50.0}));
+  EXPECT_EQ(own.width, std::vector<Real>(3, 2.0));
+  EXPECT_EQ(own.centers, (std::vector<Real>{-1.0, 4.0, -1.0, 0.0, 5.0, 0.0, 1.0, 6.0, 1.0, 2.5, 7.0, 2.5}));
+  // vectors of one player make those of all others vectors
+  const RbfNetwork mixed = parse_game(edited("v0 = -1",
+                                             "v0 = -1\nrbf = { centers = [[1, 2, 3, 4, 5, 6], [0, 0, 0, 0, 0, 0], "
+                                             "[7, 7, 7, 7, 7, 7], [8, 8, 8, 8, 8, 9]] }"))
+                               .parameters.rbf;
+  EXPECT_FALSE(mixed.diagonal);
+  ASSERT_EQ(mixed.centers.size(), 4U * 3U * 6U);
+  const auto row = [&](int m, int i) {
+    const auto first = mixed.centers.begin() + static_cast<std::ptrdiff_t>(mixed.row(m, i) * 6);
+    return std::vector<Real>(first, first + 6);
+  };
+  EXPECT_EQ(row(0, 1), (std::vector<Real>{1.0, 3.0, 5.0, 2.0, 4.0, 6.0}));
+  EXPECT_EQ(row(3, 1), (std::vector<Real>{8.0, 8.0, 8.0, 8.0, 8.0, 9.0}));
+  EXPECT_EQ(row(3, 2), std::vector<Real>(6, 2.5));
+}
+
+TEST(GameDefinition, WeightsBeginWithinTheirBound) {
+  const auto begin = [](const std::string& W0) { return edited("v0 = -1", "v0 = -1\nW0 = " + W0); };
+  const InitialState initial = parse_game(begin("[1, [2.0, -3], 0.0, 4.0]")).parameters.initial;
+  ASSERT_EQ(initial.W.size(), 4U * 6U);
+  EXPECT_EQ(initial.W[0 * 6 + 1], 1.0);
+  EXPECT_EQ(initial.W[1 * 6 + 1], 2.0);
+  EXPECT_EQ(initial.W[1 * 6 + 4], -3.0);
+  EXPECT_EQ(initial.W[1 * 6 + 0], 0.0);
+  EXPECT_TRUE(parse_game(three_players).parameters.initial.W.empty());
+}
+
+TEST(GameDefinition, DirectedGraphsHearOneWay) {
+  const CommunicationGraph graph = parse_game(edited("edges = [[1, 2], [2, 3, 0.5]]",
+                                                     "directed = true\nedges = [[1, 2], [2, 3, 0.5], [3, 1], [3, 2]]"))
+                                       .parameters.graph;
+  EXPECT_TRUE(graph.directed());
+  EXPECT_EQ(graph.weight(1, 0), 1.0);
+  EXPECT_EQ(graph.weight(0, 1), 0.0);
+  EXPECT_EQ(graph.weight(2, 1), 0.5);
+  EXPECT_EQ(graph.weight(0, 2), 1.0);
+  EXPECT_EQ(graph.weight(1, 2), 1.0);
+}
+
 TEST(GameDefinition, TermsOfBothKindsAreMerged) {
   const Game game = parse_game(edited("square = [[1, [0.0, -0.25]]]", "square = [[1, [3.0, 0.0]]]"));
   EXPECT_EQ(game.parameters.dynamics->jacobian_pattern().entries(), 3);
@@ -172,7 +219,7 @@ TEST(GameDefinition, OfTheFiveVehiclesIsThePapersExample) {
   Parameters& p = game.parameters;
   EXPECT_EQ(p.shape, (Shape{.players = 5, .dimension = 2, .neurons = 11, .order = {1, 1, 1, 2, 2}}));
   EXPECT_EQ(game.expose, Expose::all);
-  EXPECT_DOUBLE_EQ(p.rbf.width * p.rbf.width, 50.0);
+  EXPECT_DOUBLE_EQ(p.rbf.width[0] * p.rbf.width[0], 50.0);
   EXPECT_EQ(p.graph.edges(), (std::vector<std::pair<int, int>>{{0, 1}, {0, 4}, {1, 2}, {2, 3}, {3, 4}}));
   // costs at one point: f_i = i |x_i|^2 + i (x_i1 + x_i2) + i + sum_j c_ij |x_i - x_j|^2
   const std::vector<Real> x = p.initial.x;
@@ -450,6 +497,23 @@ const Refusal relations[] = {
      "player[2].dynamics.linear[2] is [1, 2], expected each player once, and player 1 comes twice"},
     {"square = [[1, [0.0, -0.25]]]", "square = [[1, 0.5], [1, 0.5]]",
      "player[2].dynamics.square[2] is [1, 0.5], expected each player once, and player 1 comes twice"},
+    {"[1, 2], [2, 3, 0.5]]", "[1, 2], [2, 3, 0.5]]\ndirected = true",
+     "graph.edges lets nothing of player 2 reach player 1, expected a strongly connected graph"},
+    {"[1, 2], [2, 3, 0.5]]", "[1, 2], [3, 1], [1, 2]]\ndirected = true",
+     "graph.edges[3] is [1, 2], expected each edge once"},
+    {"[1, 2], [2, 3, 0.5]]", "[1, 2], [2]]\ndirected = true",
+     "graph.edges[2] is [2], expected an edge [from, to] or [from, to, weight]"},
+    {"[1, 2], [2, 3, 0.5]]", "[1, 2], [2, 3]]\ndirected = 1", "graph.directed is 1, expected true or false"},
+    {"v0 = -1", "rbf = { centers = [1.0] }",
+     "player[2].rbf.centers is [1], expected a list of 4 centers, as rbf.centers is"},
+    {"v0 = -1", "rbf = { width = 0 }", "player[2].rbf.width is 0, expected a positive number"},
+    {"v0 = -1", "rbf = { rho = 1 }",
+     "\"rho\" is an unknown key of player[2].rbf, expected one of centers, width, W_max"},
+    {"v0 = -1", "W0 = 1.0", "player[2].W0 is 1, expected a list of 4 numbers or of as many lists of 2 numbers"},
+    {"v0 = -1", "W0 = [1.0, 2.0]",
+     "player[2].W0 is [1, 2], expected a list of 4 numbers or of as many lists of 2 numbers"},
+    {"v0 = -1", "W0 = [[0, 7.0], [0, 2.0], 0, 0]",
+     "the initial weights W0 of player 2, coordinate 2, have the squared norm 53, expected at most W_max, 50"},
     {"v0 = -1", "gains = { k1 = 3.0 }", "player[2].gains.k1 is 3, expected no k1 of a player of order 2, which has k4"},
     {"v0 = -1", "gains = { k3 = 0 }", "player[2].gains.k3 is 0, expected a positive number"},
     {"v0 = -1", "gains = { kappa = 1 }",

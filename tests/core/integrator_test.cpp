@@ -162,7 +162,7 @@ TEST(Integrator, RawExcessOfTheWeightsStaysWithinTheTolerance) {
       run.integrator.start(0.0, {tolerance, 0.01 * tolerance});
       for (int k = 1; k <= 300; ++k) run.integrator.advance(0.01 * k);
       EXPECT_LE(run.integrator.largest_raw_excess(), 10.0 * tolerance) << game;
-      EXPECT_LE(run.largest_norm2(), run.loop.parameters().rbf.W_max * (1.0 + 1e-9));
+      EXPECT_LE(run.largest_norm2(), run.loop.parameters().rbf.W_max[0] * (1.0 + 1e-9));
     }
   }
 }
@@ -192,7 +192,7 @@ TEST(Integrator, DoesNotChatterOnGrazingColumns) {
   game.bias = {{0.0}, {0.0}};
   game.H = testing::blocks_of(2, 2, 1);
   game.G = testing::blocks_of(2, 2, 1);
-  game.W_max = 1e6;
+  game.W_max = testing::everyone(game, 1e6);
   Simulation free_run(testing::toml_of(game));
   free_run.integrator.start(0.0, {1e-6, 1e-8});
   std::vector<Real> peaks;
@@ -208,12 +208,12 @@ TEST(Integrator, DoesNotChatterOnGrazingColumns) {
   ASSERT_GE(peaks.size(), 10U);
   const std::int64_t free_steps = free_run.integrator.statistics().steps;
   for (const Real below : {1e-4, 1e-7, 1e-10, 1e-13}) {
-    game.W_max = peaks.back() * (1.0 - below);
+    game.W_max = testing::everyone(game, peaks.back() * (1.0 - below));
     Simulation run(testing::toml_of(game));
     run.integrator.start(0.0, {1e-6, 1e-8});
     for (int k = 1; k <= 400; ++k) {
       run.integrator.advance(0.1 * k);
-      EXPECT_LE(run.largest_norm2(), game.W_max * (1.0 + 1e-9));
+      EXPECT_LE(run.largest_norm2(), game.W_max[0] * (1.0 + 1e-9));
     }
     const Statistics statistics = run.integrator.statistics();
     EXPECT_GE(statistics.events, 2) << below;
@@ -307,7 +307,7 @@ TEST(Integrator, DoesNotChatterOnTheSphere) {
       run.integrator.advance(end);
       EXPECT_LE(run.integrator.statistics().events, events) << tolerance;
       EXPECT_LE(run.integrator.statistics().steps, 3000) << tolerance;
-      EXPECT_LE(run.largest_norm2(), run.loop.parameters().rbf.W_max * (1.0 + 1e-9));
+      EXPECT_LE(run.largest_norm2(), run.loop.parameters().rbf.W_max[0] * (1.0 + 1e-9));
     }
   }
 }

@@ -288,23 +288,27 @@ TEST(Activations, AreGaussians) {
   for (const auto& [players, dimension, neurons] : loop_sizes) {
     const int n = players * dimension;
     const Array y(players * n, random);
-    const Array numbers(neurons, random);
-    const Array vectors(neurons * n, random);
-    constexpr double width = 2.7;
-    for (const bool diagonal : {true, false}) {
+    const Array numbers(neurons * players, random);
+    const Array vectors(neurons * n * players, random), sharpness(players, random, 0.05, 0.3);
+    for (const int owners : {0, 1, players}) {  // 0: centres that are numbers
       const Array computed = on_every_level([&](const Kernels& kernel) {
         Array exponent(players * (neurons + 2) + 8);
         Array activation(neurons * n);
-        (diagonal ? kernel.activations_diagonal : kernel.activations_general)(
-            players, dimension, neurons, diagonal ? numbers : vectors, width, y, exponent, activation);
+        if (owners == 0) {
+          kernel.activations_diagonal(players, dimension, neurons, numbers, sharpness, y, exponent, activation);
+        } else {
+          kernel.activations_general(players, dimension, neurons, owners, vectors, sharpness, y, exponent, activation);
+        }
         return activation;
       });
       for (int m = 0; m < neurons; ++m) {
         for (int i = 0; i < players; ++i) {
           double squares = 0.0;
-          for (int k = 0; k < n; ++k)
-            squares += std::pow(y[i * n + k] - (diagonal ? numbers[m] : vectors[m * n + k]), 2);
-          const double expected = std::exp(-squares / (width * width));
+          const int row = owners == 1 ? m : m * owners + i;
+          for (int k = 0; k < n; ++k) {
+            squares += std::pow(y[i * n + k] - (owners == 0 ? numbers[m * players + i] : vectors[row * n + k]), 2);
+          }
+          const double expected = std::exp(-squares * sharpness[i]);
           for (int l = 0; l < dimension; ++l) {
             EXPECT_NEAR(computed[m * n + l * players + i], expected, 1e-13 * expected);
           }
@@ -317,14 +321,17 @@ TEST(Activations, AreGaussians) {
 TEST(Activations, FarFromEveryCenterAreZero) {
   for (const double far : {1e3, 1e100, 1e150, 1e160}) {
     const Array y(8, far);  // two players, two dimensions
-    const Array centers(1, 1.0);
+    const Array centers(2, 1.0), sharpness(2, 1.0);
     const Array center_vectors(4, 1.0);
     for (const bool diagonal : {true, false}) {
       const Array computed = on_every_level([&](const Kernels& kernel) {
         Array exponent(2 * 3 + 8);
         Array activation(4, 9.0);
-        (diagonal ? kernel.activations_diagonal : kernel.activations_general)(
-            2, 2, 1, diagonal ? centers : center_vectors, 1.0, y, exponent, activation);
+        if (diagonal) {
+          kernel.activations_diagonal(2, 2, 1, centers, sharpness, y, exponent, activation);
+        } else {
+          kernel.activations_general(2, 2, 1, 1, center_vectors, sharpness, y, exponent, activation);
+        }
         return activation;
       });
       EXPECT_EQ(computed, Array(4, 0.0)) << far;
@@ -470,46 +477,60 @@ struct FullPattern {
   }
 };
 
+void check_blocks(int n, int listed, int width, bool directed, RandomNumbers& random) {
+  const FullPattern full(n, listed);
+  const int tiles = (n + tile_length - 1) / tile_length;
+  const auto place = [](int number, int of, int j) {
+    return (j / tile_length * of + number) * tile_length + j % tile_length;
+  };
+  // in elimination order, diagonally dominant
+  const Array lower(tiles * full.entries() * tile_length, random, -1.0, 1.0);
+  const Array other(tiles * full.entries() * tile_length, random, -1.0, 1.0);
+  const Array& upper = directed ? other : lower;
+  const Array diagonal(tiles * n * tile_length, random, 2.0 * n, 3.0 * n);
+  const Array rhs(n * width * n, random);
+  const Array solution = on_every_level([&](const Kernels& kernel) {
+    Array l(lower), u(upper), d(diagonal), x(rhs);
+    for (int tile = 0; tile < tiles; ++tile) {
+      const int entries = tile * full.entries() * tile_length;
+      if (directed) {
+        kernel.factor_directed_blocks(full.pattern(), l + entries, u + entries, d + tile * n * tile_length);
+      } else {
+        kernel.factor_blocks(full.pattern(), l + entries, d + tile * n * tile_length);
+      }
+    }
+    if (directed) {
+      kernel.solve_directed_blocks(full.pattern(), width, l, u, d, x);
+    } else {
+      kernel.solve_blocks(full.pattern(), width, l, d, x);
+    }
+    return x;
+  });
+  const auto of_player = [&](const Array& rows, int k, int h, int j) {  // unknown eliminated k-th
+    return rows[full.elimination.order[static_cast<std::size_t>(k)] * width * n + h * n + j];
+  };
+  for (int j = 0; j < n; ++j) {
+    for (int h = 0; h < width; ++h) {
+      for (int i = 0; i < n; ++i) {
+        double sum = diagonal[place(i, n, j)] * of_player(solution, i, h, j);
+        for (int k = 0; k < n; ++k) {
+          if (k == i) continue;
+          const int entry = full.entry(std::max(i, k), std::min(i, k));
+          sum += (k < i ? lower : upper)[place(entry, full.entries(), j)] * of_player(solution, k, h, j);
+        }
+        EXPECT_NEAR(sum, of_player(rhs, i, h, j), 1e-13) << n << ", " << width << ", " << directed;
+      }
+    }
+  }
+}
+
 TEST(Blocks, AreFactoredAndSolvedSideBySide) {
   RandomNumbers random(11);
   for (const auto& [n, listed] :
        {std::pair{2, 2}, {3, 3}, {5, 1}, {8, 0}, {9, 9}, {13, 5}, {13, 1}, {20, 20}, {28, 4}}) {
-    for (const int width : {1, 2, 3}) {
-      const FullPattern full(n, listed);
-      const int tiles = (n + tile_length - 1) / tile_length;
-      const auto place = [](int number, int of, int j) {
-        return (j / tile_length * of + number) * tile_length + j % tile_length;
-      };
-      // in elimination order, diagonally dominant
-      const Array lower(tiles * full.entries() * tile_length, random, -1.0, 1.0);
-      const Array diagonal(tiles * n * tile_length, random, 2.0 * n, 3.0 * n);
-      const Array rhs(n * width * n, random);
-      const Array solution = on_every_level([&](const Kernels& kernel) {
-        Array l(lower);
-        Array d(diagonal);
-        Array x(rhs);
-        for (int tile = 0; tile < tiles; ++tile) {
-          kernel.factor_blocks(full.pattern(), l + tile * full.entries() * tile_length, d + tile * n * tile_length);
-        }
-        kernel.solve_blocks(full.pattern(), width, l, d, x);
-        return x;
-      });
-      const auto of_player = [&](const Array& rows, int k, int h, int j) {  // unknown eliminated k-th
-        return rows[full.elimination.order[static_cast<std::size_t>(k)] * width * n + h * n + j];
-      };
-      for (int j = 0; j < n; ++j) {
-        for (int h = 0; h < width; ++h) {
-          for (int i = 0; i < n; ++i) {
-            double sum = diagonal[place(i, n, j)] * of_player(solution, i, h, j);
-            for (int k = 0; k < n; ++k) {
-              if (k == i) continue;
-              const int entry = full.entry(std::max(i, k), std::min(i, k));
-              sum += lower[place(entry, full.entries(), j)] * of_player(solution, k, h, j);
-            }
-            EXPECT_NEAR(sum, of_player(rhs, i, h, j), 1e-13) << n << ", " << width;
-          }
-        }
-      }
+    for (const int width : {1, 2, 3, -3}) {  // below zero: of a directed graph
+      if (width < 0 && listed < n) continue;
+      check_blocks(n, listed, std::abs(width), width < 0, random);
     }
   }
 }

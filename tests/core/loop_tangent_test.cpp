@@ -159,22 +159,40 @@ std::vector<Move> moves_of(const PlainGame& game, RandomNumbers& random) {
   add_gain("beta", &PlainGame::beta, &Gains::beta);
   add_gain("delta", &PlainGame::delta, &Gains::delta);
   add_gain("epsilon", &PlainGame::epsilon, &Gains::epsilon);
-  moves.push_back({"width", [](PlainGame& moved, Real s) { moved.width += s; },
-                   [](Parameters& direction) { direction.rbf.width = 1.0; }});
+  Numbers widths(N);
+  random.fill(widths, -1.0, 1.0);
+  moves.push_back({"width",
+                   [=](PlainGame& moved, Real s) {
+                     for (std::size_t i = 0; i < N; ++i) moved.width[i] += s * widths[i];
+                   },
+                   [=](Parameters& direction) { direction.rbf.width = widths; }});
 
-  Rows centers = game.centers;
-  random.fill(centers, -1.0, 1.0);
+  Blocks centers(N, game.centers[0]);  // the same of all players where they have one network
+  random.fill(centers[0], -1.0, 1.0);
+  for (std::size_t i = 1; i < N; ++i) centers[i] = centers[0];
+  if (game.own_rbf) random.fill(centers, -1.0, 1.0);
   moves.push_back({"centers",
                    [=](PlainGame& moved, Real s) {
-                     for (std::size_t m = 0; m < centers.size(); ++m) {
-                       for (std::size_t k = 0; k < centers[m].size(); ++k) moved.centers[m][k] += s * centers[m][k];
+                     for (std::size_t i = 0; i < N; ++i) {
+                       for (std::size_t m = 0; m < centers[i].size(); ++m) {
+                         for (std::size_t k = 0; k < centers[i][m].size(); ++k) {
+                           moved.centers[i][m][k] += s * centers[i][m][k];
+                         }
+                       }
                      }
                    },
                    [=](Parameters& direction) {
-                     for (std::size_t m = 0; m < centers.size(); ++m) {
-                       for (std::size_t k = 0; k < centers[m].size(); ++k) {
-                         const std::size_t entry = centers[m].size() == 1 ? m : m * N * D + (k % D) * N + k / D;
-                         direction.rbf.centers[entry] = centers[m][k];
+                     RbfNetwork& rbf = direction.rbf;
+                     for (std::size_t i = 0; i < N; ++i) {
+                       for (std::size_t m = 0; m < centers[i].size(); ++m) {
+                         const std::size_t row = rbf.row(static_cast<int>(m), static_cast<int>(i));
+                         if (rbf.diagonal) {
+                           rbf.centers[m * N + i] = centers[i][m][0];
+                           continue;
+                         }
+                         for (std::size_t k = 0; k < N * D; ++k) {
+                           rbf.centers[row * N * D + (k % D) * N + k / D] = centers[i][m][k];
+                         }
                        }
                      }
                    }});
@@ -182,6 +200,7 @@ std::vector<Move> moves_of(const PlainGame& game, RandomNumbers& random) {
   Rows weights = rows_of(N, N);  // edges of weight zero are moved as well
   for (std::size_t i = 0; i < N; ++i) {
     for (std::size_t j = 0; j < i; ++j) weights[i][j] = weights[j][i] = random.between(-1.0, 1.0);
+    for (std::size_t j = 0; game.directed && j < i; ++j) weights[j][i] = random.between(-1.0, 1.0);
   }
   moves.push_back({"adjacency",
                    [=](PlainGame& moved, Real s) {
@@ -191,8 +210,9 @@ std::vector<Move> moves_of(const PlainGame& game, RandomNumbers& random) {
                    },
                    [=](Parameters& direction) {
                      for (std::size_t i = 0; i < N; ++i) {
-                       for (std::size_t j = 0; j < i; ++j) {
-                         direction.graph.set_weight(static_cast<int>(i), static_cast<int>(j), weights[i][j]);
+                       for (std::size_t j = 0; j < N; ++j) {
+                         if (j != i)
+                           direction.graph.set_weight(static_cast<int>(i), static_cast<int>(j), weights[i][j]);
                        }
                      }
                    }});
@@ -262,6 +282,28 @@ std::vector<Move> moves_of(const PlainGame& game, RandomNumbers& random) {
                    }});
   add_rows("reference0", &PlainGame::reference0, [](Parameters& to, const Numbers& v) { to.initial.reference = v; });
 
+  if (!game.W0.empty()) {
+    Blocks W0 = game.W0;
+    random.fill(W0, -1.0, 1.0);
+    moves.push_back({"W0",
+                     [=](PlainGame& moved, Real s) {
+                       for (std::size_t i = 0; i < N; ++i) {
+                         for (std::size_t m = 0; m < W0[i].size(); ++m) {
+                           for (std::size_t l = 0; l < D; ++l) moved.W0[i][m][l] += s * W0[i][m][l];
+                         }
+                       }
+                     },
+                     [=](Parameters& direction) {
+                       for (std::size_t i = 0; i < N; ++i) {
+                         for (std::size_t m = 0; m < W0[i].size(); ++m) {
+                           for (std::size_t l = 0; l < D; ++l) {
+                             direction.initial.W[m * N * D + l * N + i] = W0[i][m][l];
+                           }
+                         }
+                       }
+                     }});
+  }
+
   Numbers gain(N);  // the plain game has no gain: scaling its coefficients is the same
   random.fill(gain, -1.0, 1.0);
   moves.push_back({"dynamics_gain",
@@ -286,6 +328,7 @@ TEST_P(LoopTangentOfRandomGame, FollowsParametersAtTheStart) {
     state.x = game.x0;
     state.reference = game.reference0;
     state.y = game.y0;
+    if (!game.W0.empty()) state.W = game.W0;
     return state;
   };
   std::vector<Real> initial_state(size_);

@@ -41,7 +41,7 @@ class NewtonSystem {
     loop_.weight_norms(state.data(), norm2.data());
     for (int m = 0; m < shape.neurons; ++m) {
       for (std::size_t p = 0; p < modes.size(); ++p) {
-        const Real scale = std::sqrt(loop_.parameters().rbf.W_max / norm2[p]);
+        const Real scale = std::sqrt(loop_.gains().W_max[p] / norm2[p]);
         if (modes[p] != 0 || scale < 1.0) state[at(loop_.layout().weights_of(m)) + p] *= scale;
       }
     }

@@ -56,9 +56,11 @@ struct PlainGame {
   Numbers k1, k2, k3, k4, beta, delta, epsilon;  ///< [i]
   bool own_gains = false;                        ///< stated by each player for itself
   bool diagonal = true;                          ///< centers are numbers
-  Rows centers;                                  ///< [m][0], or [m][j D + l]
-  double width = 0.0;
-  double W_max = 0.0;
+  Blocks centers;                                ///< [i][m][0], or [i][m][j D + l]
+  Numbers width, W_max;                          ///< [i]
+  bool own_rbf = false;                          ///< stated by each player for itself
+  Blocks W0;                                     ///< [i][m][l]; empty: zero
+  bool directed = false;
   Rows adjacency;  ///< [i][j]
   Numbers quadratic, constant;
   Rows linear;    ///< [i][l]
@@ -68,8 +70,8 @@ struct PlainGame {
   Rows x0, reference0;  ///< [i][l]; reference0 is z0 or v0
   Blocks y0;            ///< [i][j][l]
 
-  [[nodiscard]] double center(std::size_t m, std::size_t j, std::size_t l) const {
-    return diagonal ? centers[m][0] : centers[m][j * dimension + l];
+  [[nodiscard]] double center(std::size_t i, std::size_t m, std::size_t j, std::size_t l) const {
+    return diagonal ? centers[i][m][0] : centers[i][m][j * dimension + l];
   }
 };
 
@@ -86,6 +88,9 @@ struct Recipe {
   bool perturbed = true;
   std::vector<int> order = {};  ///< drawn when empty
   bool own_gains = false;
+  bool own_rbf = false;
+  bool directed = false;
+  bool initial_weights = false;
 };
 
 /// A connected random graph, strongly monotone costs, and nonlinearities of moderate slope.
@@ -117,22 +122,42 @@ inline PlainGame random_game(const Recipe& recipe) {
   game.delta = draw(2.0, 8.0);
   game.epsilon = draw(0.5, 2.0);
   game.diagonal = recipe.diagonal;
-  game.centers = rows_of(recipe.neurons, recipe.diagonal ? 1 : N * D);
-  random.fill(game.centers, -2.0, 2.0);
-  game.width = random.between(2.0, 6.0);
-  game.W_max = random.between(10.0, 400.0);
+  Rows centers = rows_of(recipe.neurons, recipe.diagonal ? 1 : N * D);
+  random.fill(centers, -2.0, 2.0);
+  game.centers = Blocks(N, centers);
+  game.own_rbf = recipe.own_rbf;
+  if (game.own_rbf) random.fill(game.centers, -2.0, 2.0);
+  const auto draw_for_networks = [&](double low, double high) {
+    Numbers numbers = everyone(game, random.between(low, high));
+    if (game.own_rbf) random.fill(numbers, low, high);
+    return numbers;
+  };
+  game.width = draw_for_networks(2.0, 6.0);
+  game.W_max = draw_for_networks(10.0, 400.0);
+  if (recipe.initial_weights) {
+    game.W0 = blocks_of(N, recipe.neurons, D);
+    random.fill(game.W0, -0.5, 0.5);
+  }
+  game.directed = recipe.directed;
 
   game.adjacency = rows_of(N, N);
   for (std::size_t i = 1; i < N; ++i) {
     const std::size_t j = random.below(i);
     game.adjacency[i][j] = game.adjacency[j][i] = random.between(0.3, 2.0);
   }
+  if (game.directed) {  // a circle, so that everybody is reached, and further edges one way
+    game.adjacency = rows_of(N, N);
+    for (std::size_t i = 0; i < N; ++i) {
+      game.adjacency[i][(i + 1) % N] = random.between(0.3, 2.0);
+      if (random.chance(0.5) && N > 2) game.adjacency[i][(i + 2) % N] = random.between(0.3, 2.0);
+    }
+  }
   game.coupling = rows_of(N, N);
   game.G = blocks_of(N, N, D);
   game.H = blocks_of(N, N, D);
   for (std::size_t i = 0; i < N; ++i) {
     for (std::size_t j = 0; j < N; ++j) {
-      if (j < i && game.adjacency[i][j] == 0.0 && random.chance(0.3)) {
+      if (!game.directed && j < i && game.adjacency[i][j] == 0.0 && random.chance(0.3)) {
         game.adjacency[i][j] = game.adjacency[j][i] = random.between(0.3, 2.0);
       }
       if (j != i && random.chance(0.5)) game.coupling[i][j] = random.between(0.1, 1.5);
@@ -191,19 +216,22 @@ inline std::string toml_of(const PlainGame& game) {
       {"beta", game.beta}, {"delta", game.delta}, {"epsilon", game.epsilon}};
   text += "[gains]\n";
   for (const auto& [name, values] : gains) text += name + (" = " + toml_of(values[0])) + '\n';
-  Numbers diagonal_centers;
-  for (const Numbers& center : game.centers) diagonal_centers.push_back(center[0]);
-  text += "[rbf]\ncenters = " + (game.diagonal ? toml_of(diagonal_centers) : toml_of(game.centers)) +
-          "\nwidth = " + toml_of(game.width) + "\nW_max = " + toml_of(game.W_max) + '\n';
+  const auto centers_of = [&](std::size_t i) {
+    Numbers numbers;
+    for (const Numbers& center : game.centers[i]) numbers.push_back(center[0]);
+    return game.diagonal ? toml_of(numbers) : toml_of(game.centers[i]);
+  };
+  text += "[rbf]\ncenters = " + centers_of(0) + "\nwidth = " + toml_of(game.width[0]) +
+          "\nW_max = " + toml_of(game.W_max[0]) + '\n';
   std::string edges;
   for (std::size_t i = 0; i < game.players; ++i) {
-    for (std::size_t j = i + 1; j < game.players; ++j) {
-      if (game.adjacency[i][j] == 0.0) continue;
+    for (std::size_t j = game.directed ? 0 : i + 1; j < game.players; ++j) {
+      if (game.adjacency[j][i] == 0.0) continue;
       edges += (edges.empty() ? "[" : ", [") + std::to_string(i + 1) + ", " + std::to_string(j + 1) + ", " +
-               toml_of(game.adjacency[i][j]) + ']';
+               toml_of(game.adjacency[j][i]) + ']';
     }
   }
-  text += "[graph]\nedges = [" + edges + "]\n";
+  text += std::string("[graph]\n") + (game.directed ? "directed = true\n" : "") + "edges = [" + edges + "]\n";
   for (std::size_t i = 0; i < game.players; ++i) {
     std::string coupling;
     for (std::size_t j = 0; j < game.players; ++j) {
@@ -216,7 +244,11 @@ inline std::string toml_of(const PlainGame& game) {
       own_gains += (own_gains.empty() ? "\ngains = { " : ", ") + std::string(name) + " = " + toml_of(values[i]);
     }
     text += "[[player]]\nname = \"player " + std::to_string(i + 1) + "\"\norder = " + std::to_string(game.order[i]) +
-            own_gains + (own_gains.empty() ? "" : " }") + "\nx0 = " + toml_of(game.x0[i]) +
+            own_gains + (own_gains.empty() ? "" : " }") +
+            (game.own_rbf ? "\nrbf = { centers = " + centers_of(i) + ", width = " + toml_of(game.width[i]) +
+                                ", W_max = " + toml_of(game.W_max[i]) + " }"
+                          : "") +
+            (game.W0.empty() ? "" : "\nW0 = " + toml_of(game.W0[i])) + "\nx0 = " + toml_of(game.x0[i]) +
             (game.order[i] == 1 ? "\nz0 = " : "\nv0 = ") + toml_of(game.reference0[i]) +
             "\ny0 = " + toml_of(game.y0[i]) + "\ncost = { quadratic = " + toml_of(game.quadratic[i]) +
             ", linear = " + toml_of(game.linear[i]) + ", constant = " + toml_of(game.constant[i]) + ", coupling = [" +
@@ -242,7 +274,16 @@ inline std::vector<Recipe> assorted_recipes() {
       {.seed = 9, .players = 4, .dimension = 2, .neurons = 9, .perturbed = false},
       {.seed = 10, .players = 3, .dimension = 4, .neurons = 2, .diagonal = false, .robust = false, .perturbed = false},
       {.seed = 12, .players = 5, .dimension = 2, .neurons = 3, .order = {2, 1, 1, 2, 1}, .own_gains = true},
-      {.seed = 13, .players = 10, .dimension = 1, .neurons = 4, .diagonal = false, .own_gains = true},
+      {.seed = 13, .players = 10, .dimension = 1, .neurons = 4, .own_gains = true, .own_rbf = true},
+      {.seed = 14, .players = 4, .dimension = 2, .neurons = 3, .own_gains = true, .directed = true},
+      {.seed = 15,
+       .players = 9,
+       .dimension = 1,
+       .neurons = 2,
+       .diagonal = false,
+       .own_rbf = true,
+       .directed = true,
+       .initial_weights = true},
       {.seed = 11, .players = 9, .dimension = 4, .neurons = 13, .order = {1, 2, 2, 1, 2, 1, 1, 2, 2}},
   };
 }

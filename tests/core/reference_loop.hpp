@@ -116,10 +116,10 @@ LoopState<Scalar> reference_rate(const PlainGame& game, double t, const LoopStat
       for (std::size_t j = 0; j < N; ++j) {
         for (std::size_t l = 0; l < D; ++l) {
           const Scalar seen = frozen_activation ? Scalar(std::real(y[i][j][l])) : y[i][j][l];
-          sum += (seen - game.center(m, j, l)) * (seen - game.center(m, j, l));
+          sum += (seen - game.center(i, m, j, l)) * (seen - game.center(i, m, j, l));
         }
       }
-      s.activation[i][m] = exp(-sum / (game.width * game.width));
+      s.activation[i][m] = exp(-sum / (game.width[i] * game.width[i]));
     }
     for (std::size_t l = 0; l < D; ++l) {
       // grad_i f_i(y_i), by differentiating f_i term by term
@@ -147,7 +147,7 @@ LoopState<Scalar> reference_rate(const PlainGame& game, double t, const LoopStat
       for (std::size_t m = 0; m < q && game.robust; ++m) {
         rate.W[i][m][l] = game.beta[i] * s.activation[i][m] * e;
         if (on_sphere[i][l] != 0 && std::real(e * network) >= 0.0) {
-          rate.W[i][m][l] -= game.beta[i] * e * network / game.W_max * W[i][m][l];
+          rate.W[i][m][l] -= game.beta[i] * e * network / game.W_max[i] * W[i][m][l];
         }
       }
       s.gradient[i][l] = gradient;
@@ -186,7 +186,7 @@ inline LoopState<double> random_state(const PlainGame& game, RandomNumbers& rand
       on = !on;
       double norm2 = 0.0;
       for (std::size_t m = 0; m < game.neurons; ++m) norm2 += state.W[i][m][l] * state.W[i][m][l];
-      const double factor = std::sqrt((on ? 1.0 : random.between(0.05, 0.9)) * game.W_max / norm2);
+      const double factor = std::sqrt((on ? 1.0 : random.between(0.05, 0.9)) * game.W_max[i] / norm2);
       for (std::size_t m = 0; m < game.neurons; ++m) state.W[i][m][l] *= factor;
       on_sphere[i][l] = on ? 1 : 0;
     }

@@ -59,8 +59,8 @@ PlainGame sharp_game(std::uint64_t seed) {
   game.beta = everyone(game, over_decades(random, 0.0, 6.0));
   game.delta = everyone(game, over_decades(random, 0.5, 2.5));
   game.epsilon = everyone(game, over_decades(random, -10.0, -3.0) * 0.2784645427610738 * game.delta[0]);
-  game.width = over_decades(random, 0.0, 2.0);
-  game.W_max = over_decades(random, -1.0, 3.0);
+  game.width = everyone(game, over_decades(random, 0.0, 2.0));
+  game.W_max = everyone(game, over_decades(random, -1.0, 3.0));
   game.H = testing::blocks_of(game.players, game.players, game.dimension);
   const Real dynamics = over_decades(random, -2.0, 0.3);
   for (testing::Rows& rows : game.G) scale(rows, dynamics);
@@ -85,8 +85,8 @@ PlainGame wild_game(std::uint64_t seed) {
   game.beta = everyone(game, over_decades(random, -1.0, 6.0));
   game.delta = everyone(game, over_decades(random, -6.0, 3.0));
   game.epsilon = everyone(game, over_decades(random, -6.0, 1.0));
-  game.width = over_decades(random, -0.5, 2.0);
-  game.W_max = over_decades(random, -4.0, 3.0);
+  game.width = everyone(game, over_decades(random, -0.5, 2.0));
+  game.W_max = everyone(game, over_decades(random, -4.0, 3.0));
   if (random.chance(0.7)) game.H = testing::blocks_of(game.players, game.players, game.dimension);
   const Real dynamics = over_decades(random, -2.0, 0.3);
   for (testing::Rows& rows : game.G) scale(rows, dynamics);
@@ -110,7 +110,7 @@ Outcome run(const PlainGame& game, Real tolerance, Real end) {
     for (int k = 1; k <= 10; ++k) {
       integrator.advance(end * k / 10);
       loop.weight_norms(integrator.state(), norm2.data());
-      for (const Real norm : norm2) EXPECT_LE(norm, game.W_max * (1.0 + 1e-9));
+      for (const Real norm : norm2) EXPECT_LE(norm, game.W_max[0] * (1.0 + 1e-9));
     }
   } catch (const Error& error) {
     outcome.message = error.what();

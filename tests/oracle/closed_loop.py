@@ -55,10 +55,9 @@ def pack(x: Numbers, p: Numbers, y: Numbers, W: Numbers) -> Numbers:
 
 
 def initial_state(game: Game) -> FloatArray:
-    """x(0), z(0) or v(0), y(0) from the game; W(0) = 0 as in the paper."""
+    """x(0), z(0) or v(0), y(0) and W(0) from the game."""
     p = np.where(game.first_order[:, np.newaxis], game.z0, game.v0)
-    W = np.zeros((game.players, game.neurons, game.dimension))
-    return np.asarray(pack(game.x0, p, game.y0, W), dtype=np.float64)
+    return np.asarray(pack(game.x0, p, game.y0, game.W0), dtype=np.float64)
 
 
 def signals(game: Game, state: Numbers) -> Signals:

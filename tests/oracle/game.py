@@ -50,10 +50,11 @@ class Game:
     beta: OfPlayers
     delta: OfPlayers
     epsilon: OfPlayers
-    centers: FloatArray  # (q, N D), the vectors mu_m; player-major: entry j D + l meets y_ijl
-    width: float  # rho
-    W_max: float
-    adjacency: FloatArray  # (N, N), a_ij = a_ji
+    centers: FloatArray  # (q, N D) or (N, q, N D), the vectors mu_m; player-major: entry j D + l meets y_ijl
+    width: OfPlayers  # rho
+    W_max: OfPlayers
+    W0: FloatArray  # (N, q, D)
+    adjacency: FloatArray  # (N, N), a_ij, with which i hears j; a_ij = a_ji unless the graph is directed
     x0: FloatArray  # (N, D)
     v0: FloatArray  # (N, D), zero rows for order 1
     z0: FloatArray  # (N, D), zero rows for order 2
@@ -78,7 +79,7 @@ class Game:
     @property
     def neurons(self) -> int:
         """q."""
-        return len(self.centers)
+        return int(self.centers.shape[-2])
 
     @property
     def first_order(self) -> NDArray[np.bool_]:
@@ -112,7 +113,8 @@ def game_from_table(table: Table) -> Game:
     rbf = _table(table["rbf"], "rbf")
     _check_keys(rbf, {"centers", "width", "W_max"}, set(), "rbf")
     graph = _table(table["graph"], "graph")
-    _check_keys(graph, {"edges"}, set(), "graph")
+    _check_keys(graph, {"edges"}, {"directed"}, "graph")
+    directed = _boolean(graph.get("directed", False), "graph.directed")
 
     order = np.zeros(N, dtype=np.int_)
     names: list[str] = []
@@ -128,7 +130,7 @@ def game_from_table(table: Table) -> Game:
         player = _table(entry, where)
         order[i] = _integer(player.get("order"), 1, 2, f"{where}: order")
         own_start = "z0" if order[i] == 1 else "v0"
-        optional = {own_start, "gains", "y0", "cost", "dynamics", "disturbance"}
+        optional = {own_start, "gains", "rbf", "W0", "y0", "cost", "dynamics", "disturbance"}
         _check_keys(player, {"name", "order", "x0"}, optional, where)
         names.append(_text(player["name"], f"{where}: name"))
         for key in ("x0", own_start):
@@ -164,10 +166,9 @@ def game_from_table(table: Table) -> Game:
         robust=_boolean(strategy.get("robust", True), "strategy.robust"),
         perturbed=_boolean(strategy.get("perturbed", True), "strategy.perturbed"),
         **_gains(gains, [_table(entry.get("gains", {}), "gains of a player") for entry in tables]),
-        centers=_centers(rbf["centers"], N * D),
-        width=_positive(rbf["width"], "rbf.width"),
-        W_max=_positive(rbf["W_max"], "rbf.W_max"),
-        adjacency=_adjacency(graph["edges"], N),
+        **_networks(rbf, [_table(entry.get("rbf", {}), "rbf of a player") for entry in tables], N * D),
+        W0=np.array([_weights(entry.get("W0", 0.0), len(rbf["centers"]), D) for entry in tables]),
+        adjacency=_adjacency(graph["edges"], N, directed),
         x0=state["x0"],
         v0=state["v0"],
         z0=state["z0"],
@@ -197,6 +198,32 @@ def _gains(common: Table, own: list[Table]) -> dict[str, OfPlayers]:
         name: np.array([[_positive(table.get(name, value), f"gains.{name}")] for table in own])
         for name, value in gains.items()
     }
+
+
+def _networks(common: Table, own: list[Table], length: int) -> dict[str, Any]:
+    """Each player's own network before the common one; common arrays and floats where no player has any."""
+    keys = {"centers", "width", "W_max"}
+
+    def of(rbf: Table) -> tuple[FloatArray, float, float]:
+        _check_keys(rbf, keys, set(), "rbf")
+        return (
+            _centers(rbf["centers"], length),
+            _positive(rbf["width"], "rbf.width"),
+            _positive(rbf["W_max"], "rbf.W_max"),
+        )
+
+    if not any(own):
+        return dict(zip(("centers", "width", "W_max"), of(common), strict=True))
+    centers, width, W_max = zip(*(of({**common, **table}) for table in own), strict=True)
+    columns = (np.array(numbers)[:, np.newaxis] for numbers in (width, W_max))
+    return dict(zip(("centers", "width", "W_max"), (np.array(centers), *columns), strict=True))
+
+
+def _weights(value: object, neurons: int, D: int) -> FloatArray:
+    """W0 (q, D): q numbers, each for all coordinates, or q lists of D; 0 when absent."""
+    if value == 0.0:
+        return np.zeros((neurons, D))
+    return np.array([_per_coordinate(entry, D, "W0") for entry in _list(value, "W0", neurons)])
 
 
 def _check_keys(table: Table, required: set[str], optional: set[str], where: str) -> None:
@@ -280,14 +307,17 @@ def _centers(value: object, length: int) -> FloatArray:
     return np.outer([_number(entry, "rbf.centers") for entry in entries], np.ones(length))
 
 
-def _adjacency(value: object, N: int) -> FloatArray:
+def _adjacency(value: object, N: int, directed: bool) -> FloatArray:
+    """Of an edge from i to j, j hears i: a_ji; a_ij as well unless the graph is directed."""
     adjacency = np.zeros((N, N))
     for entry in _list(value, "graph.edges"):
         edge = _list(entry, "graph.edges")
         if len(edge) not in (2, 3):
             raise GameError(f"graph.edges: [i, j] or [i, j, weight] expected, not {edge!r}")
         i, j = (_integer(end, 1, N, "graph.edges") - 1 for end in edge[:2])
-        if i == j or adjacency[i, j] != 0.0:
+        if i == j or adjacency[j, i] != 0.0:
             raise GameError(f"graph.edges: {edge!r} is a loop or given twice")
-        adjacency[i, j] = adjacency[j, i] = _positive(edge[2] if len(edge) == 3 else 1.0, "graph.edges")
+        adjacency[j, i] = _positive(edge[2] if len(edge) == 3 else 1.0, "graph.edges")
+        if not directed:
+            adjacency[i, j] = adjacency[j, i]
     return adjacency

@@ -271,7 +271,8 @@ class _Run:
         self.state = self.state.copy()
         W = unpack(self.game, self.state).W
         scale = np.ones(self.on_sphere.shape)
-        scale[self.on_sphere] = np.sqrt(self.game.W_max / np.sum(W * W, axis=1)[self.on_sphere])
+        W_max = np.broadcast_to(self.game.W_max, self.on_sphere.shape)
+        scale[self.on_sphere] = np.sqrt(W_max[self.on_sphere] / np.sum(W * W, axis=1)[self.on_sphere])
         W *= scale[:, np.newaxis, :]
 
 

@@ -73,6 +73,21 @@ def test_networkx_weights() -> None:
     assert from_networkx(graph) == CommunicationGraph(3, ((1, 2, 2.0), (2, 3, 1.0)))
 
 
+def test_directed_graphs() -> None:
+    graph = graph_of_text("3>1:0.5 1>2,2>3", 3)
+    assert graph == CommunicationGraph(3, ((1, 2, 1.0), (2, 3, 1.0), (3, 1, 0.5)), directed=True)
+    assert graph_of_text(graph.label, 3) == graph
+    assert graph.adjacency.tolist() == [[0.0, 0.0, 0.5], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]
+    assert graph.connected
+    assert graph_of(graph.adjacency) == graph
+    assert not graph_of_text("1>2 2>3", 3).connected
+    (ring,) = graphs_of_text("directed:ring", 5)
+    assert ring.label == "1>2 2>3 3>4 4>5 5>1"
+    for drawn in graphs_of_text("directed:random:0.3@3", 6, seed=1):
+        assert drawn.directed
+        assert drawn.connected
+
+
 def test_edges_of_an_fmu(fmu: Path, fmu_of: FmuOf) -> None:
     model = read_model(fmu)
     assert graph_of_model(model).label == "1-2 1-5 2-3 3-4 4-5"
@@ -111,6 +126,11 @@ def test_edges_of_an_fmu(fmu: Path, fmu_of: FmuOf) -> None:
         ("1-2 2-1", 5, "listed twice"),
         ("1-2:0", 5, "not positive"),
         ("1-2:1e", 5, "not a weight"),
+        ("1>2 2-3", 5, "'2-3' is not an edge: 2>3 or 2>3:0.5 expected"),
+        ("1>2 1>2", 5, "listed twice"),
+        ("2>2", 5, "is no edge"),
+        ("directed:star", 5, "no kind of graph 'directed:star'"),
+        ("directed:random:0", 5, "no connected graph"),
     ],
 )
 def test_graphs_that_make_no_sense(text: str, players: int, told: str) -> None:

@@ -29,7 +29,8 @@ def print_info(model: Model, *, variables: bool = False) -> None:
     for key in ("title", "fmu", "guid", "generation_tool", "players", "dimension", "neurons"):
         grid.add_row(key.replace("_", " "), Text(str(data[key])))
     grid.add_row("orders", _orders(model.order))
-    edges = ", ".join(f"{i}-{j}" + (f" ({w:g})" if w != 1.0 else "") for i, j, w in model.edges)
+    sign = ">" if model.directed else "-"
+    edges = ", ".join(f"{i}{sign}{j}" + (f" ({w:g})" if w != 1.0 else "") for i, j, w in model.edges)
     grid.add_row("graph", Text(edges))
     grid.add_row("gains", ", ".join(f"{name} = {value:g}" for name, value in model.gains.items()))
     for part, numbers in model.expressions.items():

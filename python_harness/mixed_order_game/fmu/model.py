@@ -183,18 +183,22 @@ class Model:
 
     @property
     def edges(self) -> tuple[tuple[int, int, float], ...]:
-        """Communication graph: (i, j, weight) with i < j, 1-based, positive weights."""
-        return tuple(
-            (i, j, float(variable.start))
-            for (i, j), variable in sorted(self.indexed("a").items())
-            if variable.start
-        )
+        """Communication graph, positive weights: (i, j, weight), 1-based, i < j, or (from, to, weight)."""
+        weights = ((pair, float(variable.start or 0.0)) for pair, variable in self.indexed("a").items())
+        heard = [(pair, weight) for pair, weight in weights if weight > 0.0]
+        return tuple(sorted((j, i, w) if self.directed else (i, j, w) for (i, j), w in heard))
+
+    @property
+    def directed(self) -> bool:
+        """Whether the communication graph is directed: a[i,j] is then with what weight i hears j."""
+        return any(i > j for i, j in self.indexed("a"))
 
     @property
     def gains(self) -> dict[str, float]:
-        """Start values of the gains by name; k1 to k4 in 1/s."""
+        """Start values of the gains by name, k1[1], ... where players have their own; k1 to k4 in 1/s."""
         names = ("k1", "k2", "k3", "k4", "beta", "delta", "epsilon", "rho", "W_max")
-        return {name: float(self.variable(name).start or 0.0) for name in names}
+        variables = [variable for name in names for variable in self.select([name])]
+        return {variable.name: float(variable.start or 0.0) for variable in variables}
 
     @cached_property
     def is_paper_example(self) -> bool:

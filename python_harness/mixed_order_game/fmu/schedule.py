@@ -127,7 +127,7 @@ def _read_toml(path: Path, model: Model) -> GraphSchedule:
         if ("edges" in table) == ("graph" in table):
             raise ScheduleError(f"{where} needs either edges or graph")
         if "edges" in table:
-            weights = edge_values(model, _edges(table["edges"], model.players, where))
+            weights = edge_values(model, _edges(table["edges"], model, where))
         else:
             chosen = graphs_of_text(str(table["graph"]), model.players)
             if len(chosen) != 1:
@@ -138,7 +138,9 @@ def _read_toml(path: Path, model: Model) -> GraphSchedule:
     return GraphSchedule(tuple(entries), period)
 
 
-def _edges(edges: Any, players: int, where: str) -> dict[tuple[int, ...], float]:
+def _edges(edges: Any, model: Model, where: str) -> dict[tuple[int, ...], float]:
+    """Weights by the indices of a: [i, j] with i < j, or of a directed game [from, to] as to, from."""
+    players = model.players
     weights: dict[tuple[int, ...], float] = {}
     if not isinstance(edges, list) or not all(
         isinstance(each, list) and len(each) in (2, 3) for each in edges
@@ -147,9 +149,9 @@ def _edges(edges: Any, players: int, where: str) -> dict[tuple[int, ...], float]
     for edge in edges:
         if not all(isinstance(end, int) and not isinstance(end, bool) for end in edge[:2]):
             raise ScheduleError(f"{edge} of {where} does not begin with two players")
-        i, j = sorted(edge[:2])
+        i, j = edge[1::-1] if model.directed else sorted(edge[:2])
         weight = _number(edge[2], f"the weight of {i}-{j}") if len(edge) > 2 else 1.0  # noqa: PLR2004 - [i, j, w]
-        if not 1 <= i < j <= players or weight < 0.0 or (i, j) in weights:
+        if i == j or not 1 <= min(i, j) <= max(i, j) <= players or weight < 0.0 or (i, j) in weights:
             raise ScheduleError(f"{edge} of {where} is no new edge of {players} players with a weight >= 0")
         weights[i, j] = weight
     return weights

@@ -72,9 +72,16 @@ def choose_gains(game: GameParameters) -> Choice:
 
 
 def _slowest_consensus(adjacency: NDArray[np.float64]) -> float:
-    """Smallest eigenvalue of L + diag(a_.j) for the player j that is farthest from the others."""
+    """Smallest eigenvalue of L + diag(a_.j) for the player j that is farthest from the others.
+
+    Of a directed graph the least real part over all j.
+    """
     import networkx as nx
 
+    if not np.array_equal(adjacency, adjacency.T):
+        degrees = np.diag(adjacency.sum(axis=1)) - adjacency
+        blocks = degrees + np.array([np.diag(column) for column in adjacency.T])
+        return float(np.linalg.eigvals(blocks).real.min())
     closeness = nx.closeness_centrality(nx.from_numpy_array(adjacency))
     j = min(closeness, key=lambda node: closeness[node])
     laplacian = np.diag(adjacency.sum(axis=1)) - adjacency

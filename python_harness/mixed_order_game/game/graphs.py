@@ -23,7 +23,8 @@ LARGEST_PLAYERS = 1000
 ATTEMPTS = 1000
 """Random graphs drawn until one is connected."""
 
-EDGE = re.compile(r"(\d+)-(\d+)(?::([0-9.eE+-]+))?")
+EDGE = re.compile(r"(\d+)([->])(\d+)(?::([0-9.eE+-]+))?")
+DIRECTED = "directed:"
 
 
 class GraphError(MixedOrderGameError):
@@ -32,15 +33,16 @@ class GraphError(MixedOrderGameError):
 
 @dataclass(frozen=True)
 class CommunicationGraph:
-    """An undirected weighted graph of N players: edges (i, j, weight), i < j, 1-based, sorted."""
+    """A weighted graph of N players: sorted edges (i, j, weight), 1-based, i < j; from i to j if directed."""
 
     players: int
     edges: tuple[tuple[int, int, float], ...]
+    directed: bool = False
 
     def __post_init__(self) -> None:
         pairs = [(i, j) for i, j, _ in self.edges]
         for i, j, weight in self.edges:
-            if not 1 <= i < j <= self.players:
+            if i == j or not 1 <= min(i, j) <= max(i, j) <= self.players or (i > j and not self.directed):
                 raise GraphError(f"{i}-{j} is no edge between players 1 to {self.players}")
             if not (np.isfinite(weight) and weight > 0.0):
                 raise GraphError(f"edge {i}-{j} has the weight {weight:g}, which is not positive")
@@ -49,32 +51,50 @@ class CommunicationGraph:
 
     @property
     def label(self) -> str:
-        """Edges as text: 1-2 1-5 2-3:0.5; graph_of_text reads it."""
-        return " ".join(f"{i}-{j}" + ("" if w == 1.0 else f":{w!r}") for i, j, w in self.edges)
+        """Edges as text: 1-2 1-5 2-3:0.5, directed 1>2 2>1; graph_of_text reads it."""
+        sign = ">" if self.directed else "-"
+        return " ".join(f"{i}{sign}{j}" + ("" if w == 1.0 else f":{w!r}") for i, j, w in self.edges)
 
     @cached_property
     def adjacency(self) -> NDArray[np.float64]:
-        """a_ij, (N, N)."""
+        """a_ij, (N, N): the weight with which i hears j."""
         matrix = np.zeros((self.players, self.players))
         for i, j, weight in self.edges:
-            matrix[i - 1, j - 1] = matrix[j - 1, i - 1] = weight
+            matrix[j - 1, i - 1] = weight
+            if not self.directed:
+                matrix[i - 1, j - 1] = weight
         return matrix
 
     @cached_property
     def algebraic_connectivity(self) -> float:
-        """Second smallest eigenvalue of the Laplacian; positive exactly if the graph is connected."""
+        """Second smallest eigenvalue of the Laplacian, by real parts if the graph is directed.
+
+        Positive exactly if the graph is connected; if directed, if some player reaches all others.
+        """
         laplacian = np.diag(self.adjacency.sum(axis=1)) - self.adjacency
+        if self.directed:
+            return float(np.sort(np.linalg.eigvals(laplacian).real)[1])
         return float(np.linalg.eigvalsh(laplacian)[1])
+
+    @property
+    def connected(self) -> bool:
+        """Whether every player is reached from every other one."""
+        reached = np.linalg.matrix_power((self.adjacency > 0.0) + np.eye(self.players), self.players - 1)
+        return bool(np.all(reached > 0.0))
 
     def start_values(self, model: Model) -> dict[str, float]:
         """All edge weights a[i,j] of a game for this graph. Raises GraphError if the game cannot take it."""
         if self.players != model.players:
             raise GraphError(f"the graph has {self.players} players, the game has {model.players}")
-        return edge_values(model, {(i, j): weight for i, j, weight in self.edges})
+        if self.directed and not model.directed:
+            raise GraphError("the graph is directed, and that of the game is not")
+        i, j = np.nonzero(self.adjacency if model.directed else np.triu(self.adjacency))
+        pairs = zip(i.tolist(), j.tolist(), strict=True)
+        return edge_values(model, {(i + 1, j + 1): float(self.adjacency[i, j]) for i, j in pairs})
 
 
 def edge_values(model: Model, weights: Mapping[tuple[int, ...], float]) -> dict[str, float]:
-    """Start values of every a[i,j] of a game; 0 where weights, by 1-based (i, j) with i < j, has none.
+    """Start values of every a[i,j] of a game; 0 where weights, by the 1-based indices of a, has none.
 
     Raises GraphError for an edge that is not a variable of the FMU.
     """
@@ -88,40 +108,52 @@ def edge_values(model: Model, weights: Mapping[tuple[int, ...], float]) -> dict[
 
 
 def from_networkx(graph: Any) -> CommunicationGraph:
-    """A networkx graph, its nodes numbered 1 to N in their order; the attribute weight is 1 when absent."""
+    """A networkx graph, its nodes numbered 1 to N in their order; the attribute weight is 1 when absent.
+
+    A DiGraph gives a directed one: the target of an edge hears its source.
+    """
     number = {node: k for k, node in enumerate(graph.nodes, start=1)}
     edges = []
     for a, b, weight in graph.edges(data="weight", default=1.0):
-        i, j = sorted((number[a], number[b]))
+        i, j = (number[a], number[b]) if graph.is_directed() else sorted((number[a], number[b]))
         edges.append((i, j, float(weight)))
-    return CommunicationGraph(len(number), tuple(sorted(edges)))
+    return CommunicationGraph(len(number), tuple(sorted(edges)), graph.is_directed())
 
 
 def graph_of_model(model: Model) -> CommunicationGraph:
     """The graph of an FMU's start values."""
-    return CommunicationGraph(model.players, model.edges)
+    return CommunicationGraph(model.players, model.edges, model.directed)
 
 
 def graph_of(adjacency: NDArray[np.float64]) -> CommunicationGraph:
-    """The graph of a symmetric matrix of weights a_ij (N, N)."""
-    rows, columns = np.nonzero(np.triu(adjacency, 1))
+    """The graph of a matrix of weights a_ij (N, N), directed unless it is symmetric."""
+    directed = not np.array_equal(adjacency, adjacency.T)
+    heard = adjacency.T if directed else np.triu(adjacency, 1)  # from, to
+    rows, columns = np.nonzero(heard)
     pairs = zip(rows.tolist(), columns.tolist(), strict=True)
-    return CommunicationGraph(len(adjacency), tuple((i + 1, j + 1, float(adjacency[i, j])) for i, j in pairs))
+    edges = tuple((i + 1, j + 1, float(heard[i, j])) for i, j in pairs)
+    return CommunicationGraph(len(adjacency), edges, directed)
 
 
 def graph_of_text(text: str, players: int) -> CommunicationGraph:
-    """A graph from its edges: 1-2 2-3:0.5 (separated by blanks or commas, a weight after a colon)."""
+    """A graph from its edges: 1-2 2-3:0.5 (separated by blanks or commas, a weight after a colon).
+
+    1>2 is an edge by which 2 hears 1; then all edges are directed.
+    """
     edges = []
+    directed = ">" in text
     for part in re.split(r"[\s,]+", text.strip()):
         match = EDGE.fullmatch(part)
-        if match is None:
-            raise GraphError(f"{part!r} is not an edge: 2-3 or 2-3:0.5 expected")
-        i, j = sorted((int(match[1]), int(match[2])))
+        if match is None or (match[2] == ">") != directed:
+            expected = "2>3 or 2>3:0.5" if directed else "2-3 or 2-3:0.5"
+            raise GraphError(f"{part!r} is not an edge: {expected} expected")
+        ends = int(match[1]), int(match[3])
+        i, j = ends if directed else sorted(ends)
         try:
-            edges.append((i, j, float(match[3] or 1.0)))
+            edges.append((i, j, float(match[4] or 1.0)))
         except ValueError:
-            raise GraphError(f"{match[3]!r} is not a weight") from None
-    return CommunicationGraph(players, tuple(sorted(edges)))
+            raise GraphError(f"{match[4]!r} is not a weight") from None
+    return CommunicationGraph(players, tuple(sorted(edges)), directed)
 
 
 def all_connected(players: int) -> Iterator[CommunicationGraph]:
@@ -184,13 +216,20 @@ def _generators() -> dict[str, tuple[int, bool, Generator]]:
         "small-world": (2, True, lambda n, a, seed: nx.watts_strogatz_graph(n, int(a[0]), a[1], seed=seed)),
         "scale-free": (1, True, lambda n, a, seed: nx.barabasi_albert_graph(n, int(a[0]), seed=seed)),
         "geometric": (1, True, lambda n, a, seed: nx.random_geometric_graph(n, a[0], seed=seed)),
+        "directed:ring": (0, False, lambda n, _, __: nx.cycle_graph(n, create_using=nx.DiGraph)),
+        "directed:random": (
+            1,
+            True,
+            lambda n, a, seed: nx.gnp_random_graph(n, a[0], seed=seed, directed=True),
+        ),
     }
 
 
 GRAPHS_HELP = (
     "all (every connected labelled graph), classes (one of every isomorphism class), ring, path, star, "
     "wheel, complete, tree, random:P, regular:DEGREE, small-world:K:P, scale-free:M, geometric:RADIUS, "
-    "own (the game's), or edges such as 1-2,2-3:0.5; @COUNT after a random kind draws as many"
+    "directed:ring, directed:random:P, own (the game's), or edges such as 1-2,2-3:0.5 or, directed, "
+    "1>2,2>3,3>1; @COUNT after a random kind draws as many"
 )
 
 
@@ -211,7 +250,9 @@ def graphs_of_text(
     if text == "own" and own is not None:
         return [own]
     kind, _, count_text = text.partition("@")
-    name, *argument_texts = kind.split(":")
+    directed = DIRECTED if kind.startswith(DIRECTED) else ""
+    name, *argument_texts = kind.removeprefix(DIRECTED).split(":")
+    name = directed + name
     generators = _generators()
     if name not in generators:
         raise GraphError(
@@ -245,6 +286,6 @@ def _draw(
             graph = generate(players, arguments, int(sequence.integers(2**31)))
         except (nx.NetworkXError, ValueError) as error:
             raise GraphError(f"{text} with {players} players: {error}") from error
-        if nx.is_connected(graph):
+        if nx.is_strongly_connected(graph) if graph.is_directed() else nx.is_connected(graph):
             return from_networkx(graph)
     raise GraphError(f"{text} with {players} players gave no connected graph in {ATTEMPTS} attempts")

@@ -91,14 +91,14 @@ def _graph(recipe: Recipe) -> CommunicationGraph:
     graphs = graphs_of_text(recipe.graph, recipe.players, seed=recipe.seed)
     if len(graphs) != 1:
         raise GameError(f"{recipe.graph!r} means {len(graphs)} graphs, expected one")
-    if not graphs[0].algebraic_connectivity > CONNECTED:
+    if not (graphs[0].connected if graphs[0].directed else graphs[0].algebraic_connectivity > CONNECTED):
         raise GameError(f"the graph {recipe.graph!r} does not connect all {recipe.players} players")
     return graphs[0]
 
 
 def _text(recipe: Recipe, orders: Sequence[int], graph: CommunicationGraph, choice: Choice) -> str:
     N, D = recipe.players, recipe.dimension
-    edges = [(i, j) for i, j, _ in graph.edges]
+    edges = sorted({(min(i, j), max(i, j)) for i, j, _ in graph.edges})
     random = np.random.default_rng([recipe.seed, 2])
     target = random.uniform(-5.0, 5.0, (N, D)).round(2)
     quadratic = random.uniform(1.0, 2.0, N).round(2)
@@ -114,7 +114,11 @@ def _text(recipe: Recipe, orders: Sequence[int], graph: CommunicationGraph, choi
     print(_gains(choice), file=file)
     print(_network(N * D), file=file)
     print("\n[graph]", file=file)
-    print("# Who exchanges estimates with whom: undirected edges [i, j] or [i, j, weight].", file=file)
+    if graph.directed:
+        print("# Who hears whom: to hears from, by edges [from, to] or [from, to, weight].", file=file)
+        print("directed = true", file=file)
+    else:
+        print("# Who exchanges estimates with whom: undirected edges [i, j] or [i, j, weight].", file=file)
     print(
         _wrapped(
             "edges = [", [f"[{i}, {j}]" if w == 1.0 else f"[{i}, {j}, {w!r}]" for i, j, w in graph.edges], "]"

@@ -7,25 +7,33 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..errors import GameError
 from ..fmu.model import Model, Value
 from .definition import Expressions, initial_estimates, require_coefficients
 
 FloatArray = NDArray[np.float64]
+OfPlayers = float | FloatArray
+"""One number for all players, or an array (N,) where they have their own."""
+
+GAINS = ("k1", "k2", "k3", "k4", "beta", "delta", "epsilon")
 
 
 @dataclass(frozen=True, eq=False)
 class GameParameters:
-    """N players, D coordinates; indices are 0-based here. The gains k1 to k4 are in 1/s."""
+    """N players, D coordinates; indices are 0-based here. The gains k1 to k4 are in 1/s.
+
+    Where players have gains of their own, k1 holds NaN for players of order 2 and k4 for those of order 1.
+    """
 
     order: NDArray[np.int_]  # (N,), 1 velocity-driven, 2 acceleration-driven
-    k1: float
-    k2: float
-    k3: float
-    k4: float
-    delta: float
-    epsilon: float
-    W_max: float
-    adjacency: FloatArray  # (N, N), a_ij = a_ji
+    k1: OfPlayers
+    k2: OfPlayers
+    k3: OfPlayers
+    k4: OfPlayers
+    delta: OfPlayers
+    epsilon: OfPlayers
+    W_max: OfPlayers
+    adjacency: FloatArray  # (N, N), a_ij; a_ij = a_ji unless the graph is directed
     cost_quadratic: FloatArray  # (N,), q_i
     cost_linear: FloatArray  # (N, D), l_i
     cost_coupling: FloatArray  # (N, N), c_ij
@@ -54,6 +62,20 @@ class GameParameters:
         """(N,), true for velocity-driven players."""
         return np.equal(self.order, 1)
 
+    @property
+    def regulation(self) -> FloatArray:
+        """(N,), 1/s: k1 of players of order 1, k4 of players of order 2."""
+        return np.where(self.first_order, self.k1, self.k4)
+
+    def of_players(self, name: str) -> FloatArray:
+        """(N,): a gain, or W_max, of every player."""
+        return np.broadcast_to(np.asarray(getattr(self, name), dtype=np.float64), (self.players,))
+
+    @property
+    def directed(self) -> bool:
+        """Whether some player hears another one otherwise than it is heard."""
+        return not np.array_equal(self.adjacency, self.adjacency.T)
+
     def unknown_dynamics(self, x: FloatArray) -> FloatArray:
         """g_i(x)_l = sum_j (G_ij,l x_jl + H_ij,l x_jl^2) for x (N, D); returns (N, D)."""
         require_coefficients(self.expressions, "the unknown term at a point", "dynamics")
@@ -76,13 +98,27 @@ def game_parameters(model: Model, changes: Mapping[str, Value] | None = None) ->
             entries[tuple(position - 1 for position in index)] = values[variable.name]
         return entries
 
-    upper = array("a", N, N)
+    def of_players(name: str) -> OfPlayers:
+        if name in values:
+            return float(values[name])
+        own = np.full(N, np.nan)
+        for (i,), variable in model.indexed(name).items():
+            own[i - 1] = values[variable.name]
+        return own
+
+    edges = array("a", N, N)
     gain = array("dynamics_gain", N)[:, np.newaxis, np.newaxis]
     players = model.game["player"]
     return GameParameters(
         order=np.array(model.order),
-        **{name: float(values[name]) for name in ("k1", "k2", "k3", "k4", "delta", "epsilon", "W_max")},
-        adjacency=upper + upper.T,
+        k1=of_players("k1"),
+        k2=of_players("k2"),
+        k3=of_players("k3"),
+        k4=of_players("k4"),
+        delta=of_players("delta"),
+        epsilon=of_players("epsilon"),
+        W_max=of_players("W_max"),
+        adjacency=edges if model.directed else edges + edges.T,
         cost_quadratic=array("cost_quadratic", N),
         cost_linear=array("cost_linear", N, D),
         cost_coupling=array("cost_coupling", N, N),
@@ -97,6 +133,13 @@ def game_parameters(model: Model, changes: Mapping[str, Value] | None = None) ->
         expressions=model.expressions,
         x_star=None,
     )
+
+
+def common(value: OfPlayers, name: str, what: str) -> float:
+    """A gain or bound that is the same for all players. Raises GameError where players have their own."""
+    if isinstance(value, float):
+        return value
+    raise GameError(f"{what} takes one {name} for all players, and those of this game have their own")
 
 
 def _dynamics(players: Sequence[Mapping[str, Any]], kind: str, dimension: int) -> FloatArray:

@@ -149,7 +149,9 @@ def _plane(evidence: Evidence) -> Figure | None:
     N = _drawn(result)
     x = result.x[:, :N, :PLANE]
     palette = colours(result.players)[:N]
-    edges = [(i - 1, j - 1) for i, j, _ in edges_of(result) if i <= N and j <= N]
+    edges = list(
+        dict.fromkeys((min(i, j) - 1, max(i, j) - 1) for i, j, _ in edges_of(result) if max(i, j) <= N)
+    )
     data: list[Trace] = [
         _line(x[:, i, 0], x[:, i, 1], _name(evidence, i), palette[i], width=1.5)
         | {"showlegend": N <= MOST_LEGEND}

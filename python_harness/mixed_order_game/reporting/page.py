@@ -16,7 +16,7 @@ from ..fmu.model import Value, provenance
 from ..game.parameters import game_parameters
 from ..names import parse_name
 from ..results.metrics import SETTLED, changed_values, metrics
-from ..results.plot import edges_of
+from ..results.plot import edges_of, is_directed
 from ..results.result import Result, load
 from ..version import package_version
 from .evidence import Evidence, energy_so_far, evidence_of_game, evidence_of_result
@@ -101,7 +101,10 @@ def render_page(evidence: Evidence) -> str:
         scalars=_scalars(evidence),
         players=_players(evidence),
         costs_have_expressions=evidence.model is not None and "cost" in evidence.model.expressions,
-        edges=[f"{i}-{j}" + (f" ({w:g})" if w != 1.0 else "") for i, j, w in edges_of(evidence.result)],
+        edges=[
+            f"{i}{'>' if is_directed(evidence.result) else '-'}{j}" + (f" ({w:g})" if w != 1.0 else "")
+            for i, j, w in edges_of(evidence.result)
+        ],
         others=_others(evidence.result),
         sources=() if evidence.model is None else provenance(evidence.model),
         provenance=_provenance(evidence),

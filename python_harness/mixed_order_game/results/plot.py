@@ -181,6 +181,7 @@ def plot_plane(
     """Paths of the players in the plane (D = 2), with the communication graph between their starts.
 
     Where costs change, the equilibria before the last one are drawn too, in grey.
+    Arrows show who is heard by whom where the graph is directed.
     edges: (i, j, weight), 1-based; by default those among the result's parameters, none if it has no
     parameters. width in inches. Raises PlotError unless D = 2, ResultError if x was not recorded.
     """
@@ -188,11 +189,21 @@ def plot_plane(
         raise PlotError(f"paths are drawn in the plane: the game has {result.dimension} coordinates, not 2")
     x = result.x
     colours = _colours(result.players)
+    directed = is_directed(result)
     with paper_style():
         axes = axes or new_axes(width, height=0.95 * width)
         for i, j, weight in edges_of(result) if edges is None else edges:
             ends = x[0, [i - 1, j - 1]]
-            axes.plot(*ends.T, color="0.75", linewidth=0.8 * np.sqrt(weight), zorder=1, gid="edge")
+            width_of_edge = 0.8 * np.sqrt(weight)
+            axes.plot(*ends.T, color="0.75", linewidth=width_of_edge, zorder=1, gid="edge")
+            if directed:
+                axes.annotate(
+                    "",
+                    ends.mean(axis=0) + 0.01 * (ends[1] - ends[0]),
+                    ends.mean(axis=0),
+                    arrowprops={"arrowstyle": "->", "color": "0.6", "linewidth": width_of_edge},
+                    zorder=2,
+                )
         for i, colour in enumerate(colours):
             axes.plot(*x[:, i].T, color=colour, label=str(i + 1), gid="path")
             axes.plot(*x[0, i], color=colour, marker="o", markersize=9.0, linestyle="none", zorder=3)
@@ -311,13 +322,24 @@ def new_axes(width: float = COLUMN_WIDTH, height: float | None = None) -> Axes:
 
 
 def edges_of(result: Result) -> list[tuple[int, int, float]]:
-    """Communication graph among a result's parameters: (i, j, weight), 1-based, positive weights."""
+    """Communication graph among a result's parameters, 1-based, positive weights: (i, j, weight) with i < j.
+
+    Of a directed graph (from, to, weight), see is_directed.
+    """
+    directed = is_directed(result)
     edges = []
     for name, value in result.parameters.items():
         stem, index = parse_name(name)
         if stem == "a" and value > 0.0:
-            edges.append((index[0], index[1], float(value)))
+            i, j = (index[1], index[0]) if directed else (index[0], index[1])
+            edges.append((i, j, float(value)))
     return edges
+
+
+def is_directed(result: Result) -> bool:
+    """Whether the communication graph among a result's parameters is directed: it has a[i,j] with i > j."""
+    parsed = map(parse_name, result.parameters)
+    return any(stem == "a" and index[0] > index[1] for stem, index in parsed)
 
 
 def earlier_equilibria(result: Result, players: int | None = None) -> FloatArray:

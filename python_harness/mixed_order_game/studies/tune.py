@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from ..arguments import number_argument
 from ..errors import MixedOrderGameError, SimulationError
-from ..fmu.model import Value, check_value
+from ..fmu.model import Model, Value, check_value
 from ..game.definition import require_coefficients
 from ..game.graphs import CommunicationGraph, graph_of
 from ..game.parameters import GameParameters, game_parameters
@@ -281,6 +281,7 @@ class _Search:
         self.fixed = model.expanded(self.fixed)
         if not self.names or len(set(self.names)) != len(self.names):
             raise TuneError("name every gain to tune once")
+        _require_common_gains(model)
         unknown = [name for name in (*self.names, *ranges) if name not in DEFAULT_RANGES]
         if unknown:
             raise TuneError(f"{unknown[0]} is not a gain: one of {', '.join(DEFAULT_RANGES)} expected")
@@ -609,8 +610,15 @@ def _driven(game: GameParameters) -> NDArray[np.int_]:
     return np.where(game.first_order, 0, game.players) + np.arange(game.players)
 
 
+def _require_common_gains(model: Model) -> None:
+    if any(name not in model.variables for name in DEFAULT_RANGES):
+        raise TuneError(
+            "tune takes one gain of each kind for all players, and those of this game have their own"
+        )
+
+
 def _connectivity(adjacency: FloatArray) -> float:
-    return float(np.linalg.eigvalsh(np.diag(adjacency.sum(axis=1)) - adjacency)[1])
+    return float(np.sort(np.linalg.eigvals(np.diag(adjacency.sum(axis=1)) - adjacency).real)[1])
 
 
 def _settling(found: Metrics | None) -> float:

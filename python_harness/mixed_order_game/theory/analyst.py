@@ -144,8 +144,15 @@ class Analyst:
         for j, eigenvalues in enumerate(c.eigenvalues[: LISTED + 1], start=1):
             if c.players <= LISTED:
                 text = ", ".join(f"{value:.4g}" for value in eigenvalues)
-                self._row("graph", f"eig(L + diag(a_.{j}))", text, "1", f"consensus on player {j}'s action")
-        self._row("graph", "lambda_min(M)", c.slowest_consensus, "1", "slowest consensus, M = L (x) I + A_0")
+                matrix = f"L + diag(a_.{j})"
+                matrix = f"sym({matrix})" if p.directed else matrix
+                self._row("graph", f"eig({matrix})", text, "1", f"consensus on player {j}'s action")
+        if p.directed:
+            meaning = "M = L (x) I + A_0 is not symmetric; P = p I gives M'P + P M = p (M + M')"
+            self._row("graph", "lambda_min((M + M')/2)", c.slowest_consensus, "1", meaning)
+        else:
+            meaning = "slowest consensus, M = L (x) I + A_0"
+            self._row("graph", "lambda_min(M)", c.slowest_consensus, "1", meaning)
         self._row("graph", "||M||", c.fastest_consensus, "1", "fastest consensus")
 
     def _players(self, section: str, letter: str, values: FloatArray, unit: str, meaning: str) -> None:
@@ -181,13 +188,12 @@ class Analyst:
                     f"stable from it to {own * SPAN:.3g}, tried from {own / SPAN:.3g} on; others as given"
                 )
                 self._row("exact", f"least {name}", value, "1/s", meaning)
-            meaning = f"stable from {p.k2 / SPAN:.3g} to it, tried up to {p.k2 * SPAN:.3g}; others as given"
+            k2, k3 = self.game.gains.k2, self.game.gains.k3
+            meaning = f"stable from {k2 / SPAN:.3g} to it, tried up to {k2 * SPAN:.3g}; others as given"
             self._row("exact", "greatest k2", exact_ceiling(p, "k2", span=SPAN), "1/s", meaning)
             if math.isfinite(limits["k3"]):
-                least = max(limits["k3"], p.k3 / SPAN)
-                reach = (
-                    f" With the other gains given they do for k3 from {least:.3g} to {p.k3 * SPAN:.3g} 1/s."
-                )
+                least = max(limits["k3"], k3 / SPAN)
+                reach = f" With the other gains given they do for k3 from {least:.3g} to {k3 * SPAN:.3g} 1/s."
         self.verdicts.append(
             (
                 "Without perturbation these gains converge exponentially:"

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ..game.definition import require_coefficients
 from ..game.parameters import GameParameters
-from .graph import consensus_eigenvalues, laplacian
+from .graph import consensus_eigenvalues, consensus_norm, laplacian
 from .spectrum import gradient_map, monotonicity_constant, nash_equilibrium
 
 FloatArray = NDArray[np.float64]
@@ -60,12 +60,14 @@ class LoopConstants:
 
     @property
     def slowest_consensus(self) -> float:
-        """lambda_min(M)."""
+        """lambda_min(M); of a directed graph, where M is not symmetric, lambda_min((M + M') / 2)."""
         return float(self.eigenvalues.min())
 
     @property
     def fastest_consensus(self) -> float:
         """||M|| = lambda_max(M)."""
+        if self.parameters.directed:
+            return consensus_norm(self.parameters.adjacency)
         return float(self.eigenvalues.max())
 
     @property
@@ -105,7 +107,7 @@ class LoopConstants:
     def exact_b(self) -> float:
         """||B_s M||, what b is a bound of: H_1 [y_i']_s = -k3 B_s M (y - 1 (x) xbar), not more.
 
-        M (e_i (x) h_i) = (L e_i) (x) h_i + e_i (x) (a_i. o h_i), so each row costs N^2 numbers.
+        M'(e_i (x) h_i) = (L'e_i) (x) h_i + e_i (x) (a_i. o h_i), so each row costs N^2 numbers.
         """
         A = self.parameters.adjacency
         L = laplacian(A)

@@ -20,7 +20,8 @@ from ..game.definition import (
     require_coefficients,
     with_defaults,
 )
-from ..game.parameters import GameParameters, game_parameters
+from ..game.parameters import GameParameters, common, game_parameters
+from .graph import consensus_eigenvalues
 
 FloatArray = NDArray[np.float64]
 Table = Mapping[str, Any]
@@ -59,7 +60,9 @@ class AnalysedGame:
     def gains(self) -> Gains:
         """The game's own gains."""
         p = self.parameters
-        return Gains(p.k1, p.k2, p.k3, p.k4, self.beta, p.delta, p.epsilon, p.W_max)
+        values = (p.k1, p.k2, p.k3, p.k4, self.beta, p.delta, p.epsilon, p.W_max)
+        names = ("k1", "k2", "k3", "k4", "beta", "delta", "epsilon", "W_max")
+        return Gains(*(common(value, name, ANALYSIS) for name, value in zip(names, values, strict=True)))
 
     def with_gains(self, gains: Gains) -> "AnalysedGame":
         """The same game with other gains."""
@@ -80,8 +83,10 @@ def read_game(path: Path | str, changes: Mapping[str, Value] | None = None) -> A
     if suffix_of(path) == ".fmu":
         model = read_model(path)
         require_coefficients(model.expressions, ANALYSIS)
+        _require_alike(model.game)
         values = model.start_values(changes)
         parameters = game_parameters(model, changes)
+        _require_dissipative(parameters)
         network = {**model.game["rbf"], "width": float(values["rho"])}
         for index, variable in model.indexed("center").items():
             network["centers"] = list(network["centers"])
@@ -111,6 +116,30 @@ def game_from_tables(tables: Table, path: Path) -> AnalysedGame:
     except (KeyError, TypeError, ValueError, IndexError) as error:
         told = f"{error.args[0]} is missing" if isinstance(error, KeyError) else str(error)
         raise GameError(f"{path} breaks the definition of a game: {told}") from error
+
+
+def _require_alike(tables: Table) -> None:
+    """The theorems have one gain of each kind and one network, and begin with weights of 0."""
+    for key, alike, has in (
+        ("gains", "the same gains for all players", "has gains of its own"),
+        ("rbf", "the same network for all players", "has a network of its own"),
+        ("W0", "initial weights of 0", "has others"),
+    ):
+        own = [i for i, player in enumerate(tables["player"], start=1) if player.get(key)]
+        if own:
+            raise GameError(f"{ANALYSIS} takes {alike}; player {own[0]} {has}")
+
+
+def _require_dissipative(parameters: GameParameters) -> None:
+    """Of directed graphs, the certificates' P = p I serves those whose M + M' is positive definite."""
+    if not parameters.directed:
+        return
+    least = 2.0 * float(consensus_eigenvalues(parameters.adjacency).min())
+    if least <= 0.0:
+        raise GameError(
+            f"{ANALYSIS} takes directed graphs for which M + M' is positive definite, M = L (x) I + A_0; "
+            f"that of this game has the eigenvalue {least:.3g}"
+        )
 
 
 def without_square(tables: Table) -> dict[str, Any]:
@@ -152,6 +181,7 @@ def _toml_value(value: object) -> str:
 def _game_from_tables(tables: Table, path: Path) -> AnalysedGame:
     tables = with_defaults(tables)
     require_coefficients(expressions_of(tables), ANALYSIS)
+    _require_alike(tables)
     players, gains = tables["player"], tables["gains"]
     N, D = len(players), int(tables["dimension"])
     order = np.array([int(player["order"]) for player in players])
@@ -175,7 +205,9 @@ def _game_from_tables(tables: Table, path: Path) -> AnalysedGame:
     adjacency = np.zeros((N, N))
     for i, j, *weight in tables["graph"]["edges"]:
         a, b = _player(i, N), _player(j, N)
-        adjacency[a, b] = adjacency[b, a] = float(weight[0]) if weight else 1.0
+        adjacency[b, a] = float(weight[0]) if weight else 1.0
+        if not tables["graph"].get("directed", False):
+            adjacency[a, b] = adjacency[b, a]
     parameters = GameParameters(
         order=order,
         **{name: float(gains[name]) for name in ("k1", "k2", "k3", "k4", "delta", "epsilon")},
@@ -194,6 +226,7 @@ def _game_from_tables(tables: Table, path: Path) -> AnalysedGame:
         expressions={},
         x_star=None,
     )
+    _require_dissipative(parameters)
     return AnalysedGame(
         title=str(tables["title"]),
         parameters=parameters,

@@ -24,21 +24,36 @@ def consensus_blocks(adjacency: FloatArray) -> FloatArray:
 def consensus_eigenvalues(adjacency: FloatArray) -> FloatArray:
     """Eigenvalues of each block in increasing order, (N, N), row j for block j, in units of the edge weights.
 
-    Together they are the eigenvalues of L (x) I + A_0. All are positive exactly if every component of the
-    graph holds a neighbour of every player; for a connected graph (the paper's Assumption 2) they are.
+    Together they are the eigenvalues of M = L (x) I + A_0. All are positive exactly if every component of the
+    graph holds a neighbour of every player; for a connected graph (the paper's Assumption 2) they are. For a
+    directed graph they are those of the symmetric part (M + M') / 2, which may be negative: with P = p I the
+    proofs need M only through M'P + P M = p (M + M').
     """
-    return np.asarray(np.linalg.eigvalsh(consensus_blocks(adjacency)))
+    blocks = consensus_blocks(adjacency)
+    return np.asarray(np.linalg.eigvalsh(0.5 * (blocks + blocks.transpose(0, 2, 1))))
+
+
+def consensus_norm(adjacency: FloatArray) -> float:
+    """||L (x) I + A_0||, in units of the edge weights."""
+    return float(np.linalg.norm(consensus_blocks(adjacency), 2, axis=(1, 2)).max())
 
 
 def is_connected(adjacency: FloatArray) -> bool:
-    """Whether the graph with these edge weights (N, N) is connected (the paper's Assumption 2)."""
+    """Whether the graph with these edge weights (N, N) is (strongly) connected (the paper's Assumption 2)."""
     return not unreached(adjacency)
 
 
 def unreached(adjacency: FloatArray) -> list[int]:
-    """Players, 0-based, to which no path leads from player 0 in the graph with these edge weights (N, N)."""
-    reached = np.zeros(len(adjacency), dtype=bool)
-    reached[0] = True
-    for _ in range(len(adjacency)):
-        reached |= adjacency[reached].any(axis=0)
-    return np.flatnonzero(~reached).tolist()
+    """Players, 0-based, to which no path leads from player 0, or from which none leads to it.
+
+    adjacency (N, N) holds the edge weights.
+    """
+
+    def reached(heard: FloatArray) -> NDArray[np.bool_]:
+        found = np.zeros(len(heard), dtype=bool)
+        found[0] = True
+        for _ in range(len(heard)):
+            found |= heard[found].any(axis=0)
+        return found
+
+    return np.flatnonzero(~(reached(adjacency) & reached(adjacency.T))).tolist()

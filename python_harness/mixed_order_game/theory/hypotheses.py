@@ -35,6 +35,10 @@ def standing_assumptions(game: AnalysedGame, c: LoopConstants) -> list[Hypothesi
     )
     apart = [str(player + 1) for player in unreached(p.adjacency)]
     path = f"; no path from player 1 to {', '.join(apart)}" if apart else ""
+    matrix = "L (x) I + A_0"
+    if p.directed:
+        path = "; directed, " + ("not strongly connected" if apart else "strongly connected")
+        matrix = f"the symmetric part of {matrix}"
     return [
         Hypothesis(
             "Assumption 1: own gradients globally Lipschitz",
@@ -43,8 +47,8 @@ def standing_assumptions(game: AnalysedGame, c: LoopConstants) -> list[Hypothesi
         ),
         Hypothesis(
             "Assumption 2: undirected connected graph",
-            holds=not apart and c.slowest_consensus > 0.0,
-            figures=f"lambda_min(L (x) I + A_0) = {c.slowest_consensus:.4g}{path}",
+            holds=not apart and c.slowest_consensus > 0.0 and not p.directed,
+            figures=f"lambda_min({matrix}) = {c.slowest_consensus:.4g}{path}",
         ),
         Hypothesis(
             "Assumption 3: strongly monotone", holds=c.monotonicity > 0.0, figures=f"m = {c.monotonicity:.4g}"

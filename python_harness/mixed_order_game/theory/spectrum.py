@@ -97,20 +97,21 @@ def linear_loop(game: GameParameters) -> FloatArray:
     h = gradient_map(game)
     matrix = np.zeros((2 * N + N * N, 2 * N + N * N))
     degree = game.adjacency.sum(axis=1)
+    k, k2, k3 = game.regulation, game.of_players("k2"), game.of_players("k3")
     for i in range(N):
         x, p, y = i, N + i, 2 * N + i * N
         if game.order[i] == 1:
-            matrix[x, [x, p]] = -game.k1, game.k1
-            matrix[p, y : y + N] = -game.k2 * h[i]
+            matrix[x, [x, p]] = -k[i], k[i]
+            matrix[p, y : y + N] = -k2[i] * h[i]
         else:
             matrix[x, p] = 1.0
-            matrix[p, p] = -game.k4
-            matrix[p, y : y + N] = -game.k2 * game.k4 * h[i]
+            matrix[p, p] = -k[i]
+            matrix[p, y : y + N] = -k2[i] * k[i] * h[i]
         for j in range(N):
             shared = N + j if game.order[j] == 1 else j  # xbar_j
-            matrix[y + j, y + j] -= game.k3 * (degree[i] + game.adjacency[i, j])
-            matrix[y + j, 2 * N + np.arange(N) * N + j] += game.k3 * game.adjacency[i]
-            matrix[y + j, shared] += game.k3 * game.adjacency[i, j]
+            matrix[y + j, y + j] -= k3[i] * (degree[i] + game.adjacency[i, j])
+            matrix[y + j, 2 * N + np.arange(N) * N + j] += k3[i] * game.adjacency[i]
+            matrix[y + j, shared] += k3[i] * game.adjacency[i, j]
     return matrix
 
 
@@ -120,13 +121,18 @@ def spectral_abscissa(matrix: FloatArray) -> float:
 
 
 def consensus_rate(game: GameParameters) -> float:
-    """Smallest eigenvalue of k3 (L (x) I + A_0), in 1/s: the slowest rate at which the estimates agree.
+    """Least real part of the eigenvalues of K3 (L (x) I + A_0), in 1/s: the slowest rate of agreement.
 
-    The matrix splits into the N blocks L + diag(a_1j, ..., a_Nj) of the estimates of player j.
+    The matrix splits into the N blocks L + diag(a_1j, ..., a_Nj) of the estimates of player j, rows times k3.
+    Its eigenvalues are real for an undirected graph, where it is similar to K3^1/2 (L (x) I + A_0) K3^1/2.
     """
     laplacian = np.diag(game.adjacency.sum(axis=1)) - game.adjacency
     blocks = laplacian + np.array([np.diag(column) for column in game.adjacency.T])
-    return float(game.k3 * np.linalg.eigvalsh(blocks).min())
+    k3 = game.of_players("k3")
+    if game.directed:
+        return float(np.linalg.eigvals(k3[:, np.newaxis] * blocks).real.min())
+    root = np.sqrt(k3)
+    return float(np.linalg.eigvalsh(root[:, np.newaxis] * blocks * root).min())
 
 
 def initial_deviation(game: GameParameters) -> FloatArray:

@@ -7,8 +7,9 @@ The comparison lemma on the loop's own equations, each term at its largest in th
     x_i = xbar_i + (e_i of order 1).
 
 So |e_il| <= E_il with k E + delta tanh(K delta E / epsilon) = max |p_il|, and |xbar - x*| <= (|disagreement|
-+ |E of order 2|) / (k2 m) when P is strongly monotone. An identity of the equations: it explains what was
-seen and cannot fail.
++ |E of order 2|) / (k2 m) when P is strongly monotone; where k2 differs between players, each is divided by
+its own k2 and the whole grows by the square root of their largest ratio. An identity of the equations: it
+explains what was seen and cannot fail.
 """
 
 import numpy as np
@@ -36,9 +37,9 @@ def explain(run: PerturbedRun, game: GameParameters) -> str:
     push, seeking, disagreement, bound = neighbourhood_bound(run, game)
     return (
         f"Explanation, by the run's own largest values: a push of {push:.3g} against a delta of "
-        f"{game.delta:.3g} leaves seeking errors of at most {seeking:.3g}; with a disagreement of "
-        f"{disagreement:.3g} between the estimated gradients and those at xbar the actions stay within "
-        f"{bound:.3g} of x*."
+        f"{_range(game.of_players('delta'))} leaves seeking errors of at most {seeking:.3g}; with a "
+        f"disagreement of {disagreement:.3g} between the estimated gradients and those at xbar the actions "
+        f"stay within {bound:.3g} of x*."
     )
 
 
@@ -48,7 +49,10 @@ def neighbourhood_bound(run: PerturbedRun, game: GameParameters) -> tuple[float,
     All over the last three windows of the run, for m > 0.
     """
     result, order_1 = run.result, game.first_order[:, np.newaxis]
-    gain = np.where(order_1, game.k1, game.k4)
+    gain, k2, delta, epsilon = (
+        numbers[:, np.newaxis]
+        for numbers in (game.regulation, *map(game.of_players, ("k2", "delta", "epsilon")))
+    )
     late = run.judged
     time, x, v = result.time[late], result.x[late], np.nan_to_num(result.v)[late]
     z = np.nan_to_num(result.z)[late] if game.first_order.any() else np.zeros_like(x)
@@ -56,13 +60,22 @@ def neighbourhood_bound(run: PerturbedRun, game: GameParameters) -> tuple[float,
     followed = np.where(order_1, z, v - e)  # z_i, or -k2 grad_i f_i(y_i) for order 2
     drift = np.gradient(followed, time, axis=0)
     push = np.abs((run.unknown - result.nn)[late] - drift).max(axis=0)
-    seeking = bound_of_seeking_error(push, gain, game.delta, game.epsilon)
+    seeking = bound_of_seeking_error(push, gain, delta, epsilon)
 
     estimated = np.where(order_1, drift, v - e)  # -k2 grad_i f_i(y_i) for both orders
     offset = np.where(order_1, z, x) - nash_equilibrium(game)
-    actual = game.k2 * np.einsum("ij,tjl->til", gradient_map(game), offset)
+    actual = k2 * np.einsum("ij,tjl->til", gradient_map(game), offset)
     disagreement = float(np.linalg.norm(actual + estimated, axis=(1, 2)).max())
-    second = float(np.linalg.norm(np.where(order_1, 0.0, seeking)))
+    # by V = sum of |xbar_i - x*_i|^2 / (2 k2_i), which falls while |xbar - x*| m > |K2^-1 (the rest)|
+    rest = float(np.linalg.norm((actual + estimated) / k2, axis=(1, 2)).max())
+    second = float(np.linalg.norm(np.where(order_1, 0.0, seeking) / k2))
     first = float(np.where(order_1, seeking, 0.0).max())
-    bound = (disagreement + second) / (game.k2 * monotonicity_constant(game)) + first
+    spread = float(np.sqrt(k2.max() / k2.min()))
+    bound = spread * (rest + second) / monotonicity_constant(game) + first
     return float(push.max()), float(seeking.max()), disagreement, bound
+
+
+def _range(numbers: FloatArray) -> str:
+    """One number, or from the least to the largest."""
+    low, high = float(numbers.min()), float(numbers.max())
+    return f"{low:.3g}" if low == high else f"{low:.3g} to {high:.3g}"

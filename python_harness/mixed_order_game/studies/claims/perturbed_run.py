@@ -6,9 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ...fmu.model import Value
 from ...fmu.run import Progress, Simulator
 from ...game.definition import has_expressions
-from ...game.parameters import GameParameters
+from ...game.parameters import GameParameters, OfPlayers
 from ...results.result import Result
 from ...results.unknown_term import recorded_for_unknown_term, unknown_term
 from ...theory.spectrum import gradient_map
@@ -78,15 +79,15 @@ def perturbed_run(
     simulator: Simulator,
     game: GameParameters,
     *,
-    epsilon: float,
+    epsilon: OfPlayers,
     stop_time: float,
     step: float,
     least_window: float = 0.0,
     progress: Progress | None = None,
 ) -> PerturbedRun | Ended:
-    """Run from 0 to stop_time with this width of the boundary layer, sampled every step, times in s.
+    """Run from 0 to stop_time with these widths of the boundary layer, sampled every step, times in s.
 
-    least_window: shortest window that may be judged, in s.
+    epsilon: one number, or one of each player. least_window: shortest window that may be judged, in s.
     """
     model = simulator.model
     recorded = [stem for stem in RECORDED if stem in model.variables or model.indexed(stem)]
@@ -94,9 +95,15 @@ def perturbed_run(
     count = len(model.select(recorded))
     step = max(step, stop_time * count / LARGEST_RECORD)
 
+    widths: dict[str, Value] = (
+        {"epsilon": epsilon}
+        if isinstance(epsilon, float)
+        else {f"epsilon[{i}]": float(width) for i, width in enumerate(epsilon, start=1)}
+    )
+
     def run(stop: float, follow: Progress) -> Result:
         return simulator.run(
-            start_values={"robust": True, "perturbed": True, "epsilon": epsilon},
+            start_values={"robust": True, "perturbed": True, **widths},
             stop_time=stop,
             step=step,
             tolerance=TOLERANCE,
@@ -117,7 +124,7 @@ def _measured(result: Result, game: GameParameters, window: float) -> PerturbedR
     floor = RESOLVED * TOLERANCE * (largest + 0.01)
     steepest = 1.0  # 1/s, where it is not known
     if not has_expressions(game.expressions, "cost"):
-        steepest = game.k2 * float(np.abs(gradient_map(game)).sum(axis=1).max())
+        steepest = float((game.of_players("k2") * np.abs(gradient_map(game)).sum(axis=1)).max())
     pushed = max(float(np.abs(unknown[judged]).max()), float(np.abs(result.nn[judged]).max()))
 
     def maxima(values: FloatArray, resolved: float) -> Maxima:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ...fmu.model import Value
 from ...fmu.run import Simulator
-from ...game.parameters import GameParameters
+from ...game.parameters import GameParameters, OfPlayers
 from .early_end import Ended
 from .perturbed_run import PerturbedRun, disturbance_periods, perturbed_run, sample_step
 from .seeking_error import layer_slope
@@ -80,7 +80,7 @@ def observe(
     step = sample_step(min(window, limit / SHORTEST), periods)
     dominates = layer_dominates(game, values, periods, simulator.model.neurons)
 
-    def run(name: str, epsilon: float, stop: float) -> PerturbedRun | Ended:
+    def run(name: str, epsilon: OfPlayers, stop: float) -> PerturbedRun | Ended:
         def report(time: float) -> None:
             if progress is not None:
                 progress(name, time / limit)
@@ -103,7 +103,7 @@ def observe(
         ready = own.actions.agree and own.residual.agree and SHORTEST * window <= stop
         if not ready or (not own.settled and stop < limit):
             continue
-        if _saturates(own, game.delta, ""):
+        if _saturates(own, game, ""):
             break
         thinner = run("a quarter of epsilon", QUARTER * game.epsilon, stop)
         seen = Observed(game, limit, window, dominates, own, thinner)
@@ -125,9 +125,10 @@ def layer_dominates(
     """
     if not periods.size:
         return False
-    adaptation = values["beta"] * neurons * float(periods.max()) / (2.0 * np.pi)
-    gains = [game.k1] * bool(game.first_order.any()) + [game.k4] * bool((~game.first_order).any())
-    return layer_slope(game.delta, game.epsilon) > max(*gains, adaptation)
+    beta = np.array([values.get(f"beta[{i}]", values.get("beta")) for i in range(1, game.players + 1)])
+    adaptation = beta * neurons * float(periods.max()) / (2.0 * np.pi)
+    slope = layer_slope(game.of_players("delta"), game.of_players("epsilon"))
+    return bool(np.all(slope > np.maximum(game.regulation, adaptation)))
 
 
 def practical_convergence(observed: Observed) -> list[Claim]:
@@ -170,7 +171,7 @@ def _judge(observed: Observed, signal: str) -> Claim:
     found = (
         _too_short(observed)
         or _grows(run, signal)
-        or _saturates(run, observed.game.delta, "")
+        or _saturates(run, observed.game, "")
         or _unsettled(run, signal, "")
         or _of_quarter(observed, run, signal)
     )
@@ -200,12 +201,17 @@ def _grows(run: PerturbedRun, signal: str) -> Found:
     return None
 
 
-def _saturates(run: PerturbedRun, delta: float, which: str) -> Found:
-    residual = run.residual.largest
+def _saturates(run: PerturbedRun, game: GameParameters, which: str) -> Found:
+    residual, of_player, delta = run.residual.largest, "", game.delta
+    if not isinstance(delta, float):
+        residuals = np.abs((run.unknown - run.result.nn)[run.judged]).max(axis=(0, 2))  # (N,)
+        i = int(np.argmax(residuals - delta))
+        residual, of_player, delta = float(residuals[i]), f" of player {i + 1}", float(delta[i])
     if residual < delta or residual <= run.residual.floor:
         return None
     return Verdict.NOT_COVERED, (
-        f"{which}The residual g + d - W'S reaches {residual:.3g} {_by(run)} and delta is {delta:.3g}: "
+        f"{which}The residual g + d - W'S{of_player} reaches {residual:.3g} {_by(run)} and "
+        f"delta is {delta:.3g}: "
         f"the robust term saturates; the largest |x - x*| is {run.actions.largest:.3g}."
     )
 
@@ -223,7 +229,7 @@ def _of_quarter(observed: Observed, run: PerturbedRun, signal: str) -> Found:
     if not isinstance(quarter, PerturbedRun):
         return Verdict.NOT_SETTLED, f"{which}{quarter or 'not run.'}"
     own, thinner = run.signal(signal), quarter.signal(signal)
-    found = _saturates(quarter, observed.game.delta, which) or _unsettled(quarter, signal, which)
+    found = _saturates(quarter, observed.game, which) or _unsettled(quarter, signal, which)
     if found:
         return found
     problem = _not_shrunk(own, thinner, dominates=observed.dominates)

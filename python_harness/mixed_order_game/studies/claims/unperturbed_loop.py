@@ -70,9 +70,9 @@ def spectrum_of(game: GameParameters) -> Spectrum:
     if has_expressions(game.expressions, "cost"):
         return Spectrum(None, marginal=False, slowest_rate=0.0)
     if game.players > LARGEST_LINEAR_LOOP:
-        gains = [game.k1] * bool(game.first_order.any()) + [game.k4] * bool((~game.first_order).any())
-        pull = game.k2 * monotonicity_constant(game)
-        return Spectrum(None, marginal=False, slowest_rate=max(0.0, min(pull, consensus_rate(game), *gains)))
+        pull = float(np.min(game.k2)) * monotonicity_constant(game)
+        rates = (pull, consensus_rate(game), float(game.regulation.min()))
+        return Spectrum(None, marginal=False, slowest_rate=max(0.0, min(rates)))
     eigenvalues = np.linalg.eigvals(linear_loop(game))
     abscissa = float(eigenvalues.real.max())
     marginal = abs(abscissa) <= ZERO * float(np.abs(eigenvalues).max())
