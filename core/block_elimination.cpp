@@ -10,11 +10,12 @@
 
 namespace mixed_order_game {
 
-BlockElimination::BlockElimination(const CommunicationGraph& graph) : directed(graph.directed()) {
-  const int n = graph.players();
+BlockElimination::BlockElimination(const CommunicationGraph& graph)
+    : directed(graph.directed()), blocks(graph.players()) {
+  const int n = graph.hosts();
   std::vector<Eigen::Triplet<double, int>> entries;
   for (int i = 0; i < n; ++i) entries.emplace_back(i, i, 1.0);
-  for (const auto& [i, j] : graph.edges()) {
+  for (const auto& [i, j] : graph.hosted_edges()) {
     entries.emplace_back(i, j, 1.0);
     entries.emplace_back(j, i, 1.0);
   }
@@ -28,7 +29,7 @@ BlockElimination::BlockElimination(const CommunicationGraph& graph) : directed(g
 
   // elimination of k joins all its later neighbours
   std::vector<std::set<int>> column(at(n));
-  for (const auto& [i, j] : graph.edges()) {
+  for (const auto& [i, j] : graph.hosted_edges()) {
     column[at(std::min(position[at(i)], position[at(j)]))].insert(std::max(position[at(i)], position[at(j)]));
   }
   for (int k = 0; k < n; ++k) {
@@ -74,14 +75,13 @@ std::vector<int> BlockElimination::targets() const {
 }
 
 std::int64_t BlockElimination::bytes() const {
-  const std::int64_t n = players();
-  const std::int64_t padded = (n + tile_length - 1) / tile_length * tile_length;
+  const std::int64_t padded = (blocks + tile_length - 1) / tile_length * tile_length;
   std::int64_t pairs = 0;
   for (int k = 0; k < listed; ++k) {
     const std::int64_t rows = start[at(k + 1)] - start[at(k)];
     pairs += rows * (rows - 1) / 2;
   }
-  return ((directed ? 2 : 1) * std::int64_t{entries()} + n) * padded * std::int64_t{sizeof(Real)} +
+  return ((directed ? 2 : 1) * std::int64_t{entries()} + players()) * padded * std::int64_t{sizeof(Real)} +
          pairs * std::int64_t{sizeof(int)};
 }
 

@@ -16,6 +16,7 @@ struct BlockElimination {
   explicit BlockElimination(const CommunicationGraph& graph);
 
   bool directed = false;
+  int blocks = 0;          ///< one for each player, of the hosted players each
   std::vector<int> order;  ///< order[k] is the player eliminated k-th
   int listed = 0;          ///< columns before the full ones
   std::vector<int> start;  ///< column k < listed: entries start[k] .. start[k + 1] - 1

@@ -7,18 +7,22 @@
 
 namespace mixed_order_game {
 
-GainRows::GainRows(const Shape& shape) {
-  for (AlignedVector* row : {&k, &k2, &beta, &delta, &sharpness, &steepest, &W_max}) row->resize(at(shape.actions()));
-  sharpness_of_activations.resize(at(shape.players));
+GainRows::GainRows(const Shape& shape) : k3(at(shape.hosts())) {
+  for (AlignedVector* row : {&k, &k2, &beta, &delta, &sharpness, &steepest, &W_max}) {
+    row->resize(at(shape.own_entries()));
+  }
+  sharpness_of_activations.resize(at(shape.hosts()));
 }
 
 void GainRows::refresh(const Shape& shape, const Gains& gains, const RbfNetwork& rbf) {
-  for (std::size_t i = 0; i < rbf.width.size(); ++i) {
-    sharpness_of_activations[i] = 1.0 / (rbf.width[i] * rbf.width[i]);
+  for (int h = 0; h < shape.hosts(); ++h) {
+    const Real width = rbf.width[at(shape.host(h))];
+    sharpness_of_activations[at(h)] = 1.0 / (width * width);
   }
-  for (int entry = 0; entry < shape.actions(); ++entry) {
+  if (!shape.hosts_all()) own_centers = rbf.centers_of_hosts(shape);
+  for (int entry = 0; entry < shape.own_entries(); ++entry) {
     const std::size_t p = at(entry);
-    const std::size_t i = at(shape.player_of(entry));
+    const std::size_t i = at(shape.player_of_own(entry));
     k[p] = shape.order[i] == 2 ? gains.k4[i] : gains.k1[i];
     W_max[p] = rbf.W_max[i];
     k2[p] = gains.k2[i];
@@ -27,11 +31,22 @@ void GainRows::refresh(const Shape& shape, const Gains& gains, const RbfNetwork&
     sharpness[p] = robust_term_constant * gains.delta[i] / gains.epsilon[i];
     steepest[p] = robust_term_constant * gains.delta[i] * gains.delta[i] / gains.epsilon[i];
   }
+  for (int h = 0; h < shape.hosts(); ++h) k3[at(h)] = gains.k3[at(shape.host(h))];
 }
 
 ClosedLoop::ClosedLoop(Parameters parameters)
-    : parameters_(std::move(parameters)), layout_(parameters_.shape), gains_(parameters_.shape) {
+    : parameters_(std::move(parameters)),
+      layout_(parameters_.shape),
+      gains_(parameters_.shape),
+      is_whole_(shape().hosts_all() && shape().external.empty()),
+      number_heard_(at(shape().players), -1) {
   refresh();
+  inputs_ = InputLayout(parameters_);
+  for (int p = 0; p < shape().own_entries(); ++p) {
+    own_.push_back({shape().entry_of_own(p), layout_.x_of(p), layout_.reference_of(p),
+                    shape().is_second_order(shape().player_of_own(p))});
+  }
+  for (std::size_t k = 0; k < inputs_.heard().size(); ++k) number_heard_[at(inputs_.heard()[k])] = static_cast<int>(k);
 }
 
 void ClosedLoop::refresh() {
@@ -48,9 +63,9 @@ void ClosedLoop::set_time_origin(Real time_origin) {
 void ClosedLoop::initial_state(Real* state) const {
   initial_state(parameters_.initial, state);
   if (parameters_.initial.W.empty()) return;
-  AlignedVector norm2(at(shape().actions()));
+  AlignedVector norm2(at(shape().own_entries()));
   weight_norms(state, norm2.data());
-  for (int p = 0; p < shape().actions(); ++p) {
+  for (int p = 0; p < shape().own_entries(); ++p) {
     const Real factor = std::sqrt(gains_.W_max[at(p)] / norm2[at(p)]);
     if (!(factor < 1.0)) continue;
     for (int m = 0; m < shape().neurons; ++m) state[layout_.weights_of(m) + p] *= factor;
@@ -58,34 +73,54 @@ void ClosedLoop::initial_state(Real* state) const {
 }
 
 void ClosedLoop::initial_state(const InitialState& initial, Real* state) const {
-  std::copy(initial.x.begin(), initial.x.end(), state + layout_.x());
-  std::copy(initial.reference.begin(), initial.reference.end(), state + layout_.reference());
+  for (const OwnEntry& own : own_) {
+    if (own.x >= 0) state[own.x] = initial.x[at(own.entry)];
+    if (own.reference >= 0) state[own.reference] = initial.reference[at(own.entry)];
+  }
   std::copy(initial.y.begin(), initial.y.end(), state + layout_.estimates());
-  Real* W = state + layout_.weights();
-  std::fill(std::copy(initial.W.begin(), initial.W.end(), W), state + layout_.size(), 0.0);
+  std::fill(state + layout_.weights(), state + layout_.size(), 0.0);
+  if (initial.W.empty()) return;
+  for (int m = 0; m < shape().neurons; ++m) {
+    const Real* W = initial.W.data() + m * shape().actions();
+    for (std::size_t p = 0; p < own_.size(); ++p) state[at(layout_.weights_of(m)) + p] = W[own_[p].entry];
+  }
 }
 
-void ClosedLoop::evaluate_errors(const Real* state, Signals& signals) const {
+Plants ClosedLoop::plants(const Real* state, const Real* inputs, Signals& signals) const {
+  if (is_whole_) return {state + layout_.x(), state + layout_.reference()};
+  for (AlignedVector* joint : {&signals.actions, &signals.references}) joint->resize(at(shape().actions()));
+  for (const OwnEntry& own : own_) {
+    if (own.x >= 0) signals.actions[at(own.entry)] = state[own.x];
+    if (own.reference >= 0) signals.references[at(own.entry)] = state[own.reference];
+  }
+  const Real* from = inputs + inputs_.x();
+  for (const int entry : inputs_.actions()) signals.actions[at(entry)] = *from++;
+  from = inputs + inputs_.v();
+  for (const int entry : inputs_.velocities()) signals.references[at(entry)] = *from++;
+  return {signals.actions.data(), signals.references.data()};
+}
+
+void ClosedLoop::evaluate_errors(const Real* state, const Real* inputs, Signals& signals) const {
   const auto& [shape, gains, strategy, rbf, graph, cost, dynamics, disturbance, initial, named, guess] = parameters_;
-  const Real* x = state + layout_.x();
-  const Real* reference = state + layout_.reference();  // z or v
+  const auto [x, reference] = plants(state, inputs, signals);
   Real* e = signals.error.data();
   const Real* gradient = signals.gradient.data();
 
   cost->own_gradients(state + layout_.estimates(), shape.actions(), signals.gradient.data());
-  for (int l = 0; l < shape.dimension; ++l) {
-    for (int i = 0; i < shape.players; ++i) {
-      const int p = l * shape.players + i;
-      const bool second = shape.is_second_order(i);
-      signals.shared[at(p)] = terms::shared_signal(second, x[p], reference[p]);
-      e[p] = terms::error(second, x[p], reference[p], gains_.k2[at(p)], gradient[p]);
-    }
+  for (std::size_t p = 0; p < own_.size(); ++p) {
+    const std::size_t k = at(own_[p].entry);
+    signals.shared[k] = terms::shared_signal(own_[p].second, x[k], reference[k]);
+    e[p] = terms::error(own_[p].second, x[k], reference[k], gains_.k2[p], gradient[p]);
+  }
+  for (std::size_t k = 0; k < inputs_.heard().size(); ++k) {
+    const Real* xbar = inputs + inputs_.xbar_of(static_cast<int>(k));
+    for (int l = 0; l < shape.dimension; ++l) signals.shared[at(shape.entry(inputs_.heard()[k], l))] = xbar[l];
   }
 }
 
 void ClosedLoop::evaluate_robust_term(Signals& signals) const {
   // phi_i = delta tanh(K delta e_i / epsilon)
-  kernels().scaled_tanh(shape().actions(), gains_.delta.data(), gains_.sharpness.data(), signals.error.data(),
+  kernels().scaled_tanh(shape().own_entries(), gains_.delta.data(), gains_.sharpness.data(), signals.error.data(),
                         signals.robust.data());
 }
 
@@ -94,21 +129,22 @@ void ClosedLoop::evaluate_network(const Real* state, Signals& signals) const {
   const RbfNetwork& rbf = parameters_.rbf;
   const Shape& shape = parameters_.shape;
   const Real* y = state + layout_.estimates();
+  const Real* centers = shape.hosts_all() ? rbf.centers.data() : gains_.own_centers.data();
   if (rbf.diagonal) {
-    kernel.activations_diagonal(shape.players, shape.dimension, shape.neurons, rbf.centers.data(),
+    kernel.activations_diagonal(shape.hosts(), shape.actions(), shape.dimension, shape.neurons, centers,
                                 gains_.sharpness_of_activations.data(), y, signals.exponent.data(),
                                 signals.activation.data());
   } else {
-    kernel.activations_general(shape.players, shape.dimension, shape.neurons, rbf.per_player ? shape.players : 1,
-                               rbf.centers.data(), gains_.sharpness_of_activations.data(), y, signals.exponent.data(),
-                               signals.activation.data());
+    kernel.activations_general(shape.hosts(), shape.actions(), shape.dimension, shape.neurons,
+                               rbf.per_player ? shape.hosts() : 1, centers, gains_.sharpness_of_activations.data(), y,
+                               signals.exponent.data(), signals.activation.data());
   }
-  kernel.column_products(shape.actions(), shape.neurons, state + layout_.weights(), signals.activation.data(),
+  kernel.column_products(shape.own_entries(), shape.neurons, state + layout_.weights(), signals.activation.data(),
                          signals.network.data());
 }
 
-void ClosedLoop::evaluate_seeking(const Real* state, Signals& signals) const {
-  evaluate_errors(state, signals);
+void ClosedLoop::evaluate_seeking(const Real* state, const Real* inputs, Signals& signals) const {
+  evaluate_errors(state, inputs, signals);
   if (parameters_.strategy.robust) {
     evaluate_network(state, signals);
     evaluate_robust_term(signals);
@@ -118,14 +154,12 @@ void ClosedLoop::evaluate_seeking(const Real* state, Signals& signals) const {
   }
 }
 
-void ClosedLoop::evaluate(Real t, const Real* state, const Real* d_ext, const Modes& modes, Signals& signals,
+void ClosedLoop::evaluate(Real t, const Real* state, const Real* inputs, const Modes& modes, Signals& signals,
                           Real* rate) const {
   const Kernels& kernel = kernels();
   const auto& [shape, gains, strategy, rbf, graph, cost, dynamics, disturbance, initial, named, guess] = parameters_;
-  const int players = shape.players;
-  const int n = shape.actions();
-  const Real* x = state + layout_.x();
-  const Real* reference = state + layout_.reference();
+  const int n = shape.own_entries();
+  const Real* d_ext = inputs + inputs_.d_ext();
   const Real* e = signals.error.data();
   const Real* s = signals.network.data();
   const Real* phi = signals.robust.data();
@@ -133,7 +167,7 @@ void ClosedLoop::evaluate(Real t, const Real* state, const Real* d_ext, const Mo
   Real* g = signals.dynamics.data();
   Real* d = signals.disturbance.data();
 
-  evaluate_seeking(state, signals);
+  evaluate_seeking(state, inputs, signals);
   if (strategy.robust) {
     for (int p = 0; p < n; ++p)
       signals.radial[at(p)] = modes[at(p)] != 0 && e[p] * s[p] >= 0.0 ? s[p] / gains_.W_max[at(p)] : 0.0;
@@ -142,6 +176,7 @@ void ClosedLoop::evaluate(Real t, const Real* state, const Real* d_ext, const Mo
   } else {
     std::fill(rate + layout_.weights(), rate + layout_.size(), 0.0);
   }
+  const auto [x, reference] = plants(state, inputs, signals);
   if (strategy.perturbed) {
     dynamics->values(x, reference, g);
     disturbance->values(t, d);
@@ -151,28 +186,44 @@ void ClosedLoop::evaluate(Real t, const Real* state, const Real* d_ext, const Mo
     std::copy_n(d_ext, n, d);
   }
 
-  for (int l = 0; l < shape.dimension; ++l) {
-    for (int i = 0; i < players; ++i) {
-      const int p = l * players + i;
-      const bool second = shape.is_second_order(i);
-      const Real u = terms::control(gains_.k[at(p)], e[p], s[p], phi[p]);
-      const Real driven = u + g[p] + d[p];
-      signals.control[at(p)] = u;
-      rate[layout_.x() + p] = second ? reference[p] : driven;  // x' = v or x' = u + g + d
-      rate[layout_.reference() + p] = second ? driven : terms::reference_rate(gains_.k2[at(p)], gradient[p]);
+  for (std::size_t p = 0; p < own_.size(); ++p) {
+    const auto& [entry, to_x, to_reference, second] = own_[p];
+    const Real u = terms::control(gains_.k[p], e[p], s[p], phi[p]);
+    const Real driven = u + g[p] + d[p];
+    signals.control[p] = u;
+    if (to_x >= 0) rate[to_x] = second ? reference[entry] : driven;  // x' = v or x' = u + g + d
+    if (to_reference >= 0) rate[to_reference] = second ? driven : terms::reference_rate(gains_.k2[p], gradient[p]);
+  }
+  kernel.estimate_rates(shape.hosts(), shape.players, shape.dimension, graph.hosted_neighbours(), graph.neighbours(),
+                        gains_.k3.data(), state + layout_.estimates(), signals.shared.data(),
+                        rate + layout_.estimates());
+  if (!inputs_.heard().empty()) add_consensus_with_others(state, inputs, rate);
+}
+
+/// -k3 sum_k a_ik (y_ij - y_kj) over players k elsewhere.
+void ClosedLoop::add_consensus_with_others(const Real* state, const Real* inputs, Real* rate) const {
+  const NeighbourRows rows = parameters_.graph.neighbours();
+  const int n = shape().actions();
+  for (int h = 0; h < shape().hosts(); ++h) {
+    const Real* own = state + layout_.estimates_of(h);
+    Real* own_rate = rate + layout_.estimates_of(h);
+    for (int e = rows.start[h]; e < rows.start[h + 1]; ++e) {
+      const int k = number_heard_[at(rows.neighbour[e])];
+      if (k < 0) continue;
+      const Real* other = inputs + inputs_.y_of(k);
+      const Real gain = -gains_.k3[at(h)] * rows.weight[e];
+      for (int p = 0; p < n; ++p) own_rate[p] += gain * (own[p] - other[p]);
     }
   }
-  kernel.estimate_rates(players, shape.dimension, graph.neighbours(), gains.k3.data(), state + layout_.estimates(),
-                        signals.shared.data(), rate + layout_.estimates());
 }
 
 void ClosedLoop::weight_norms(const Real* state, Real* norm2) const {
   const Real* W = state + layout_.weights();
-  kernels().column_products(shape().actions(), shape().neurons, W, W, norm2);
+  kernels().column_products(shape().own_entries(), shape().neurons, W, W, norm2);
 }
 
-void ClosedLoop::event_functions(const Real* state, const Modes& modes, Real tolerance, Signals& signals,
-                                 Real* values) const {
+void ClosedLoop::event_functions(const Real* state, const Real* inputs, const Modes& modes, Real tolerance,
+                                 Signals& signals, Real* values) const {
   constexpr Real almost_zero = 1e-100;  // integrators stop watching a function that begins at zero
   if (!parameters_.strategy.robust) {
     std::fill_n(values, modes.size(), -1.0);
@@ -180,7 +231,7 @@ void ClosedLoop::event_functions(const Real* state, const Modes& modes, Real tol
   }
   weight_norms(state, values);
   if (std::any_of(modes.begin(), modes.end(), [](auto mode) { return mode != 0; })) {
-    evaluate_errors(state, signals);
+    evaluate_errors(state, inputs, signals);
     evaluate_network(state, signals);
   }
   for (std::size_t p = 0; p < modes.size(); ++p) {
@@ -192,9 +243,10 @@ void ClosedLoop::event_functions(const Real* state, const Modes& modes, Real tol
   }
 }
 
-int ClosedLoop::resolve_modes(const Real* state, Real tolerance, Signals& signals, Modes& modes) const {
+int ClosedLoop::resolve_modes(const Real* state, const Real* inputs, Real tolerance, Signals& signals,
+                              Modes& modes) const {
   AlignedVector values(modes.size());
-  event_functions(state, modes, tolerance, signals, values.data());
+  event_functions(state, inputs, modes, tolerance, signals, values.data());
   int changed = 0;
   for (std::size_t p = 0; p < modes.size(); ++p) {
     if (!(values[p] > 0.0)) continue;
@@ -204,12 +256,12 @@ int ClosedLoop::resolve_modes(const Real* state, Real tolerance, Signals& signal
   return changed;
 }
 
-void ClosedLoop::project(const Modes& modes, Signals& signals, Real* state) const {
+void ClosedLoop::project(const Modes& modes, const Real* inputs, Signals& signals, Real* state) const {
   if (std::any_of(modes.begin(), modes.end(), [](auto mode) { return mode != 0; })) {
-    evaluate_errors(state, signals);
+    evaluate_errors(state, inputs, signals);
     evaluate_network(state, signals);
   }
-  for (int p = 0; p < shape().actions(); ++p) {
+  for (int p = 0; p < shape().own_entries(); ++p) {
     Real norm2 = 0.0;
     for (int m = 0; m < shape().neurons; ++m) {
       const Real w = state[layout_.weights_of(m) + p];

@@ -9,24 +9,61 @@ CommunicationGraph::CommunicationGraph(int players, bool directed)
   refresh();
 }
 
+CommunicationGraph::CommunicationGraph(const Shape& shape, bool directed)
+    : players_(shape.players),
+      directed_(directed),
+      hosted_(shape.hosted),
+      adjacency_(at(shape.players) * at(shape.players)) {
+  refresh();
+}
+
 void CommunicationGraph::set_weight(int i, int j, Real weight) {
   adjacency_[at(i) * at(players_) + at(j)] = weight;
   if (!directed_) adjacency_[at(j) * at(players_) + at(i)] = weight;
 }
 
 void CommunicationGraph::refresh() {
-  start_.assign(1, 0);
-  neighbour_.clear();
-  weight_.clear();
-  for (int i = 0; i < players_; ++i) {
+  all_ = {};
+  inner_ = {};
+  for (int h = 0; h < hosts(); ++h) {
+    int number = 0;  // of the next hosted player from j on
     for (int j = 0; j < players_; ++j) {
-      if (weight(i, j) != 0.0) {
-        neighbour_.push_back(j);
-        weight_.push_back(weight(i, j));
-      }
+      while (number < hosts() && host(number) < j) ++number;
+      const Real a = weight(host(h), j);
+      if (a == 0.0) continue;
+      all_.neighbour.push_back(j);
+      all_.weight.push_back(a);
+      if (hosted_.empty() || number == hosts() || host(number) != j) continue;
+      inner_.neighbour.push_back(number);
+      inner_.weight.push_back(a);
     }
-    start_.push_back(static_cast<int>(neighbour_.size()));
+    all_.start.push_back(static_cast<int>(all_.neighbour.size()));
+    inner_.start.push_back(static_cast<int>(inner_.neighbour.size()));
   }
+}
+
+std::vector<int> CommunicationGraph::heard_elsewhere() const {
+  std::vector<int> heard;
+  for (int j = 0; j < players_; ++j) {
+    if (hosted_.empty() || std::binary_search(hosted_.begin(), hosted_.end(), j)) continue;
+    for (int h = 0; h < hosts(); ++h) {
+      if (weight(host(h), j) == 0.0) continue;
+      heard.push_back(j);
+      break;
+    }
+  }
+  return heard;
+}
+
+std::vector<std::pair<int, int>> CommunicationGraph::hosted_edges() const {
+  if (hosted_.empty()) return edges();
+  std::vector<std::pair<int, int>> edges;
+  for (int h = 0; h < hosts(); ++h) {
+    for (int k = h + 1; k < hosts(); ++k) {
+      if (weight(host(h), host(k)) > 0.0 || weight(host(k), host(h)) > 0.0) edges.emplace_back(h, k);
+    }
+  }
+  return edges;
 }
 
 std::vector<std::pair<int, int>> CommunicationGraph::edges() const {

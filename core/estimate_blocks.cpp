@@ -9,6 +9,7 @@ namespace mixed_order_game {
 void EstimateBlocks::analyse(const CommunicationGraph& graph, const std::vector<Real>& k3, int dimension) {
   factored_ = 0.0;
   players_ = graph.players();
+  hosts_ = graph.hosts();
   dimension_ = dimension;
   directed_ = graph.directed();
   k3_ = k3[0];
@@ -16,10 +17,10 @@ void EstimateBlocks::analyse(const CommunicationGraph& graph, const std::vector<
   row_.clear();
   for (const Real own : k3) row_.push_back(directed_ ? own / k3_ : std::sqrt(own / k3_));
   if (!directed_ && std::any_of(k3.begin(), k3.end(), [&](Real other) { return other != k3_; })) scale_ = row_;
-  gain_.resize(at(players_) * at(players_));
+  gain_.resize(at(hosts_) * at(players_));
   seen_.clear();
-  for (int i = 0; i < players_; ++i) {
-    for (int j = 0; j < players_; ++j) seen_.push_back(row_[at(i)] * graph.weight(i, j));
+  for (int h = 0; h < hosts_; ++h) {
+    for (int j = 0; j < players_; ++j) seen_.push_back(row_[at(h)] * graph.weight(graph.host(h), j));
   }
   if (by_modes()) {
     find_modes(graph);
@@ -29,34 +30,38 @@ void EstimateBlocks::analyse(const CommunicationGraph& graph, const std::vector<
 }
 
 void EstimateBlocks::find_modes(const CommunicationGraph& graph) {
-  const int N = players_;
-  const int n = N * dimension_;
-  vector_.resize(at(N) * at(N) * at(n));
-  for (AlignedVector* rows : {&eigenvalue_, &shared_, &inverse_}) rows->resize(at(N) * at(n));
-  Eigen::MatrixXd laplacian = Eigen::MatrixXd::Zero(N, N);
-  for (const auto& [i, k] : graph.edges()) {
-    laplacian(i, k) = laplacian(k, i) = -graph.weight(i, k);
-    laplacian(i, i) += graph.weight(i, k);
-    laplacian(k, k) += graph.weight(i, k);
+  const int H = hosts_;
+  const int n = players_ * dimension_;
+  vector_.resize(at(H) * at(H) * at(n));
+  for (AlignedVector* rows : {&eigenvalue_, &shared_, &inverse_}) rows->resize(at(H) * at(n));
+  Eigen::MatrixXd laplacian = Eigen::MatrixXd::Zero(H, H);
+  for (const auto& [i, k] : graph.hosted_edges()) {
+    const Real weight = graph.weight(graph.host(i), graph.host(k));
+    laplacian(i, k) = laplacian(k, i) = -weight;
+    laplacian(i, i) += weight;
+    laplacian(k, k) += weight;
   }
-  for (int i = 0; i < N; ++i) {
-    for (int k = 0; k < N; ++k) laplacian(i, k) *= scale(i) * scale(k);
+  for (const int j : graph.heard_elsewhere()) {
+    for (int i = 0; i < H; ++i) laplacian(i, i) += graph.weight(graph.host(i), j);
   }
-  for (int j = 0; j < N; ++j) {
-    Eigen::VectorXd seen(N);
-    Eigen::VectorXd own(N);  // diagonal of S diag(a_.j) S
-    for (int i = 0; i < N; ++i) {
-      seen(i) = seen_[at(i * N + j)];
+  for (int i = 0; i < H; ++i) {
+    for (int k = 0; k < H; ++k) laplacian(i, k) *= scale(i) * scale(k);
+  }
+  for (int j = 0; j < players_; ++j) {
+    Eigen::VectorXd seen(H);
+    Eigen::VectorXd own(H);  // diagonal of S diag(a_.j) S
+    for (int i = 0; i < H; ++i) {
+      seen(i) = seen_[at(i * players_ + j)];
       own(i) = scale(i) * seen(i);
     }
     const Eigen::MatrixXd block = laplacian + Eigen::MatrixXd(own.asDiagonal());
     const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(block);
     const Eigen::VectorXd shared = solver.eigenvectors().transpose() * seen;
-    for (int p = j; p < n; p += N) {
-      for (int k = 0; k < N; ++k) {
+    for (int p = j; p < n; p += players_) {
+      for (int k = 0; k < H; ++k) {
         eigenvalue_[at(k * n + p)] = solver.eigenvalues()(k);
         shared_[at(k * n + p)] = shared(k);
-        for (int i = 0; i < N; ++i) vector_[at((k * N + i) * n + p)] = solver.eigenvectors()(i, k);
+        for (int i = 0; i < H; ++i) vector_[at((k * H + i) * n + p)] = solver.eigenvectors()(i, k);
       }
     }
   }
@@ -65,8 +70,9 @@ void EstimateBlocks::find_modes(const CommunicationGraph& graph) {
 void EstimateBlocks::find_pattern(const CommunicationGraph& graph) {
   elimination_ = BlockElimination(graph);
   target_ = elimination_.targets();
-  const int n = players_;
+  const int n = hosts_;
   const std::vector<int>& order = elimination_.order;
+  const auto weight = [&](int h, int k) { return graph.weight(graph.host(h), graph.host(k)); };
   player_.clear();
   edge_.clear();
   back_edge_.clear();
@@ -76,23 +82,23 @@ void EstimateBlocks::find_pattern(const CommunicationGraph& graph) {
       player_.push_back(order[at(elimination_.row[at(a)])]);
       const int i = player_.back();
       const int h = order[at(k)];
-      edge_.push_back(row_[at(i)] * graph.weight(i, h) * scale(h));
-      if (directed_) back_edge_.push_back(row_[at(h)] * graph.weight(h, i));
+      edge_.push_back(row_[at(i)] * weight(i, h) * scale(h));
+      if (directed_) back_edge_.push_back(row_[at(h)] * weight(h, i));
     }
   }
   edge_.resize(at(elimination_.entries()));
   for (int i = elimination_.listed; i < n; ++i) {
     for (int k = elimination_.listed; k < i; ++k) {
-      const Real weight = graph.weight(order[at(k)], order[at(i)]);
-      edge_[at(elimination_.full_entry(i, k))] = scale(order[at(k)]) * weight * scale(order[at(i)]);
+      const int h = order[at(k)];
+      edge_[at(elimination_.full_entry(i, k))] = scale(h) * weight(h, order[at(i)]) * scale(order[at(i)]);
     }
   }
   for (int k = 0; k < n; ++k) {
     Real degree = 0.0;
-    for (int i = 0; i < n; ++i) degree += graph.weight(order[at(k)], i);
+    for (int i = 0; i < players_; ++i) degree += graph.weight(graph.host(order[at(k)]), i);
     degree_.push_back(row_[at(order[at(k)])] * degree * scale(order[at(k)]));
   }
-  const std::size_t padded = at((n + tile_length - 1) / tile_length * tile_length);
+  const std::size_t padded = at((players_ + tile_length - 1) / tile_length * tile_length);
   lower_.resize(edge_.size() * padded);
   upper_.resize(back_edge_.size() * padded);
   diagonal_.resize(at(n) * padded);
@@ -112,17 +118,17 @@ void EstimateBlocks::factor(Real gamma) {
 
 void EstimateBlocks::factor_tiles(Real gamma_k3) {
   const int n = players_;
-  kernels().scale(n * n, gamma_k3, seen_.data(), gain_.data());
+  kernels().scale(hosts_ * n, gamma_k3, seen_.data(), gain_.data());
   for (int first = 0; first < n; first += tile_length) {  // blocks first .. last - 1
     const int last = std::min(n, first + tile_length);
     Real* lower = lower_.data() + at(first) * edge_.size();
-    Real* diagonal = diagonal_.data() + first * n;
+    Real* diagonal = diagonal_.data() + first * hosts_;
     for (std::size_t a = 0; a < edge_.size(); ++a)
       std::fill_n(lower + a * tile_length, tile_length, -gamma_k3 * edge_[a]);
     Real* upper = upper_.data() + at(first) * back_edge_.size();
     for (std::size_t a = 0; a < back_edge_.size(); ++a)
       std::fill_n(upper + a * tile_length, tile_length, -gamma_k3 * back_edge_[a]);
-    for (int k = 0; k < n; ++k) {
+    for (int k = 0; k < hosts_; ++k) {
       Real* row = diagonal + k * tile_length;
       std::fill_n(row, tile_length, 1.0 + gamma_k3 * degree_[at(k)]);
       for (int j = first; j < last; ++j) {
@@ -141,7 +147,7 @@ void EstimateBlocks::factor_tiles(Real gamma_k3) {
 void EstimateBlocks::solve(Real* rows) const {
   if (!scale_.empty()) {
     const int n = players_ * dimension_;
-    for (int i = 0; i < players_; ++i) kernels().scale(n, 1.0 / scale_[at(i)], rows + i * n, rows + i * n);
+    for (int i = 0; i < hosts_; ++i) kernels().scale(n, 1.0 / scale_[at(i)], rows + i * n, rows + i * n);
   }
   if (by_modes()) {
     kernels().solve_modes(modes(), inverse_.data(), rows);

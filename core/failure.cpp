@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
-#include <initializer_list>
 #include <tuple>
 
 namespace mixed_order_game {
@@ -13,7 +12,7 @@ namespace {
 constexpr Real too_large = 1e150;  // its square can still be added up
 constexpr Real out_of_proportion = 1e6;
 
-std::string indexed(std::string name, std::initializer_list<int> indices) {  // from zero
+std::string indexed(std::string name, const std::vector<int>& indices) {  // from zero
   char before = '[';
   for (const int index : indices) {
     name += before + std::to_string(index + 1);
@@ -29,21 +28,59 @@ std::string number_text(Real value, int digits) {
   return {text, std::to_chars(text, text + sizeof text, value, std::chars_format::general, digits).ptr};
 }
 
-std::string state_name(const ClosedLoop& loop, int k) {
+namespace {
+
+struct Named {
+  const char* name;
+  std::vector<int> index;  // from zero, a player's first
+};
+
+Named state_entry(const ClosedLoop& loop, int k) {
   const Shape& shape = loop.shape();
   const StateLayout& layout = loop.layout();
-  const int row = k / shape.actions();
-  const int p = k % shape.actions();
-  const int i = shape.player_of(p);
-  const int l = shape.coordinate_of(p);
-  if (k < layout.reference()) return indexed("x", {i, l});
-  if (k < layout.estimates()) return indexed(shape.is_second_order(i) ? "v" : "z", {i, l});
-  if (k < layout.weights()) return indexed("y", {row - 2, i, l});
-  return indexed("W", {i, row - 2 - shape.players, l});
+  const int own = shape.own_entries();
+  for (int p = 0; p < own && k < layout.estimates(); ++p) {
+    const int i = shape.player_of_own(p);
+    const int l = p / shape.hosts();
+    if (k == layout.x_of(p)) return {"x", {i, l}};
+    if (k == layout.reference_of(p)) return {shape.is_second_order(i) ? "v" : "z", {i, l}};
+  }
+  if (k < layout.weights()) {
+    const int h = (k - layout.estimates()) / shape.actions();
+    const int entry = (k - layout.estimates()) % shape.actions();
+    return {"y", {shape.host(h), shape.player_of(entry), shape.coordinate_of(entry)}};
+  }
+  const int m = (k - layout.weights()) / own;
+  const int p = (k - layout.weights()) % own;
+  return {"W", {shape.player_of_own(p), m, p / shape.hosts()}};
+}
+
+}  // namespace
+
+std::string state_name(const ClosedLoop& loop, int k) {
+  const auto [name, index] = state_entry(loop, k);
+  return indexed(name, index);
+}
+
+std::string input_name(const ClosedLoop& loop, int k) {
+  const Shape& shape = loop.shape();
+  const InputLayout& inputs = loop.inputs();
+  const auto of_entry = [&](const char* name, int entry) {
+    return indexed(name, {shape.player_of(entry), shape.coordinate_of(entry)});
+  };
+  if (k < inputs.x()) return of_entry("d_ext", shape.entry_of_own(k));
+  if (k < inputs.v()) return of_entry("x", inputs.actions()[at(k - inputs.x())]);
+  if (k < inputs.y_of(0)) return of_entry("v", inputs.velocities()[at(k - inputs.v())]);
+  if (k < inputs.xbar_of(0)) {
+    const int entry = (k - inputs.y_of(0)) % shape.actions();
+    const int j = inputs.heard()[at((k - inputs.y_of(0)) / shape.actions())];
+    return indexed("y", {j, shape.player_of(entry), shape.coordinate_of(entry)});
+  }
+  const int from_xbar = k - inputs.xbar_of(0);
+  return indexed("xbar", {inputs.heard()[at(from_xbar / shape.dimension)], from_xbar % shape.dimension});
 }
 
 std::string unbounded_growth(const ClosedLoop& loop, const Real* state) {
-  const Shape& shape = loop.shape();
   const int size = loop.layout().weights();  // the weights are bounded
   AlignedVector initial(at(loop.layout().size()));
   loop.initial_state(initial.data());
@@ -51,29 +88,25 @@ std::string unbounded_growth(const ClosedLoop& loop, const Real* state) {
   const int k = static_cast<int>(std::max_element(state, state + size, larger) - state);
   const Real largest_at_start = std::fabs(*std::max_element(initial.begin(), initial.begin() + size, larger));
   if (std::fabs(state[k]) <= out_of_proportion * std::max(1.0, largest_at_start)) return {};
-  const int estimate = k - loop.layout().estimates();
-  const int player = estimate < 0 ? shape.player_of(k % shape.actions()) : estimate / shape.actions();
-  return "player " + std::to_string(player + 1) + " grows without bound: " + state_name(loop, k) + " has reached " +
+  const auto [name, index] = state_entry(loop, k);
+  return "player " + std::to_string(index[0] + 1) + " grows without bound: " + indexed(name, index) + " has reached " +
          number_text(state[k]);
 }
 
-std::string unusable_rate(const ClosedLoop& loop, const Real* d_ext, const Signals& signals, const Real* rate) {
+std::string unusable_rate(const ClosedLoop& loop, const Real* inputs, const Signals& signals, const Real* rate) {
   const Shape& shape = loop.shape();
   const auto usable = [](Real value) { return std::fabs(value) < too_large; };
-  for (int p = 0; p < shape.actions(); ++p) {
-    if (!usable(d_ext[p])) {
-      return "the input " + indexed("d_ext", {shape.player_of(p), shape.coordinate_of(p)}) + " is " +
-             number_text(d_ext[p]);
-    }
+  for (int k = 0; k < loop.inputs().size(); ++k) {
+    if (!usable(inputs[k])) return "the input " + input_name(loop, k) + " is " + number_text(inputs[k]);
   }
   const bool perturbed = loop.parameters().strategy.perturbed;
   for (const auto& [name, signal, acts] : {std::tuple{"gradient of the cost", &signals.gradient, true},
                                            {"unknown dynamics", &signals.dynamics, perturbed},
                                            {"disturbance", &signals.disturbance, true}}) {
-    for (int p = 0; p < shape.actions() && acts; ++p) {
+    for (int p = 0; p < shape.own_entries() && acts; ++p) {
       const Real value = (*signal)[at(p)];
       if (usable(value)) continue;
-      return std::string("the ") + name + " of player " + std::to_string(shape.player_of(p) + 1) + " is " +
+      return std::string("the ") + name + " of player " + std::to_string(shape.player_of_own(p) + 1) + " is " +
              number_text(value);
     }
   }

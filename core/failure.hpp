@@ -11,6 +11,8 @@ std::string number_text(Real value, int digits = 6);
 
 /// Of entry k of the state vector, such as "x[1,2]" or "y[1,3,2]", as the FMU names its variables.
 std::string state_name(const ClosedLoop& loop, int k);
+/// Of input k.
+std::string input_name(const ClosedLoop& loop, int k);
 
 /// Names the player whose state has grown out of all proportion to the initial state, the largest entry and its value;
 /// empty when there is none.
@@ -18,6 +20,6 @@ std::string unbounded_growth(const ClosedLoop& loop, const Real* state);
 
 /// Names what makes the rates of this evaluation too large to go on with, or not finite: an input, a signal or, when it
 /// is none of these, a rate; empty when none is.
-std::string unusable_rate(const ClosedLoop& loop, const Real* d_ext, const Signals& signals, const Real* rate);
+std::string unusable_rate(const ClosedLoop& loop, const Real* inputs, const Signals& signals, const Real* rate);
 
 }  // namespace mixed_order_game

@@ -90,10 +90,11 @@ std::string groups(const std::vector<std::vector<int>>& components) {
   return text;
 }
 
-CommunicationGraph read_graph(const TomlEntry& table, int players) {
+CommunicationGraph read_graph(const TomlEntry& table, const Shape& shape) {
   table.accept_keys({"edges", "directed"});
   const bool directed = table["directed"].present() && table["directed"].boolean();
-  CommunicationGraph graph(players, directed);
+  const int players = shape.players;
+  CommunicationGraph graph(shape, directed);
   const TomlEntry edges = table["edges"];
   const std::string expected = directed ? "[from, to] or [from, to, weight]" : "[i, j] or [i, j, weight]";
   const std::size_t count = edges.length("a list of edges " + expected);
@@ -104,12 +105,15 @@ CommunicationGraph read_graph(const TomlEntry& table, int players) {
     const int from = edge.item(0).integer(1, players) - 1;
     const int to = edge.item(1).integer(1, players) - 1;
     if (from == to) edge.fail("an edge between two different players");
+    if (shape.host_number(to) < 0 && (directed || shape.host_number(from) < 0)) {
+      edge.fail("an edge of a player that is not elsewhere");
+    }
     if (graph.weight(to, from) != 0.0)
       edge.fail(directed ? "each edge once" : "each edge once, in one of its directions");
     graph.set_weight(to, from, length == 3 ? edge.item(2).positive() : 1.0);
   }
   graph.refresh();
-  const auto apart = graph.not_reached();
+  const auto apart = shape.hosts_all() ? graph.not_reached() : std::nullopt;
   if (apart && directed) {
     throw GameError(edges.path() + " lets nothing of player " + std::to_string(apart->first + 1) + " reach player " +
                     std::to_string(apart->second + 1) + ", expected a strongly connected graph");
@@ -180,8 +184,10 @@ void read_coefficients(const TomlEntry& table, int i, const Shape& shape, Coeffi
   }
 }
 
-constexpr std::string_view player_keys[] = {"name", "order", "gains", "rbf",  "x0",       "z0",
-                                            "v0",   "y0",    "W0",    "cost", "dynamics", "disturbance"};
+constexpr std::string_view player_keys[] = {"name", "order", "gains", "rbf",  "x0",       "z0",         "v0",
+                                            "y0",   "W0",    "plant", "cost", "dynamics", "disturbance"};
+
+bool is_elsewhere(const TomlEntry& player) { return player["elsewhere"].present() && player["elsewhere"].boolean(); }
 
 /// A player's own table before the defaults, key by key.
 class PlayerTable {
@@ -292,8 +298,50 @@ bool is_x0(const TomlEntry& entry) {
   return true;
 }
 
+/// Which players are hosted, the order of each, and whose plants are outside.
+void read_players(const TomlEntry& tables, const TomlEntry& defaults, Shape& shape) {
+  std::vector<int> hosted;
+  std::vector<std::uint8_t> external(at(shape.players));
+  for (int i = 0; i < shape.players; ++i) {
+    const TomlEntry own = tables.item(at(i));
+    const PlayerTable player(own, defaults);
+    if (is_elsewhere(own)) {
+      own.accept_keys({"elsewhere", "order"});
+    } else {
+      std::vector<std::string_view> keys(std::begin(player_keys), std::end(player_keys));
+      keys.emplace_back("elsewhere");
+      own.accept_keys(keys);
+      hosted.push_back(i);
+      if (const TomlEntry plant = player["plant"]; plant.present()) {
+        if (plant.text() != "external") plant.fail("\"external\", or no plant for one inside the loop");
+        external[at(i)] = 1;
+      }
+    }
+    shape.order.push_back(player["order"].integer(1, 2));
+  }
+  if (hosted.empty()) tables.fail("a player that is not elsewhere");
+  if (hosted.size() != at(shape.players)) shape.hosted = hosted;
+  if (std::find(external.begin(), external.end(), 1) != external.end()) shape.external = external;
+}
+
+/// What belongs to a plant, of a player whose plant is outside; keys that only the defaults have are for the others.
+void refuse_plant(const PlayerTable& player, int i) {
+  for (const std::string_view key : {"x0", "v0", "dynamics", "disturbance"}) {
+    if (player.has_own(key)) {
+      player[key].fail("no " + std::string(key) + " of player " + std::to_string(i + 1) + ", whose plant is external");
+    }
+  }
+}
+
 void read_actions(const PlayerTable& player, int i, const Shape& shape, InitialState& initial) {
   const bool second = shape.is_second_order(i);
+  if (!shape.has_plant(i)) {
+    if (second && player.has_own("z0")) player["z0"].fail("no z0 for a player of order 2");
+    if (second) return;
+    if (player["z0"].is_text()) player["z0"].fail("numbers, as the plant is external");
+    player["z0"].numbers_if_present(shape.dimension, shape.players, &initial.reference[at(i)]);
+    return;
+  }
   player["x0"].numbers(shape.dimension, shape.players, &initial.x[at(i)]);
   // a default for players of the other order is none for this one
   if (second && player.has_own("z0")) player["z0"].fail("no z0 for a player of order 2, which has v0");
@@ -309,9 +357,12 @@ void read_actions(const PlayerTable& player, int i, const Shape& shape, InitialS
 }
 
 // After the actions of all players: estimates may begin there.
-void read_estimates(const TomlEntry& y0, int i, const Shape& shape, InitialState& initial) {
-  Real* estimates = &initial.y[at(i) * at(shape.actions())];
+void read_estimates(const TomlEntry& y0, int h, const Shape& shape, InitialState& initial) {
+  Real* estimates = &initial.y[at(h) * at(shape.actions())];
   if (is_x0(y0)) {
+    for (int j = 0; j < shape.players; ++j) {
+      if (!shape.has_plant(j)) y0.fail("numbers, as x0 of player " + std::to_string(j + 1) + " is not known here");
+    }
     std::copy(initial.x.begin(), initial.x.end(), estimates);
     return;
   }
@@ -356,6 +407,7 @@ std::vector<Real> read_guess(const TomlEntry& table, const Shape& shape, const I
   std::vector<Real> guess = initial.x;
   const TomlEntry list = table["guess"];
   if (!list.present()) return guess;
+  if (!shape.hosts_all()) list.fail("no guess of an equilibrium where players are elsewhere");
   const std::string expected = "a list of " + std::to_string(shape.players) + " actions, one for each player";
   if (list.length(expected) != at(shape.players)) list.fail(expected);
   for (int i = 0; i < shape.players; ++i) list.item(at(i)).numbers(shape.dimension, shape.players, &guess[at(i)]);
@@ -366,23 +418,25 @@ std::vector<Real> read_guess(const TomlEntry& table, const Shape& shape, const I
 std::int64_t variable_count(const Parameters& parameters) {
   const Shape& shape = parameters.shape;
   const std::int64_t N = shape.players;
+  const std::int64_t H = shape.hosts();
   const std::int64_t D = shape.dimension;
   const std::int64_t q = shape.neurons;
-  const std::int64_t gains = parameters.gains.per_player ? 6 * N : 7;  // k1 or k4, k2, k3, beta, delta, epsilon
-  const std::int64_t networks = parameters.rbf.per_player ? N : 1;
+  const std::int64_t gains = parameters.gains.per_player ? 6 * H : 7;  // k1 or k4, k2, k3, beta, delta, epsilon
+  const std::int64_t networks = parameters.rbf.per_player ? H : 1;
   const std::int64_t network = networks * (2 + (parameters.rbf.diagonal ? q : 0));  // W_max, rho, center
-  const std::int64_t edges = N * (N - 1) / (parameters.graph.directed() ? 1 : 2);
-  const std::int64_t graph_and_cost = edges + N + N * D + N * (N - 1);
-  const std::int64_t dynamics_and_disturbance = N + 4 * N * D;
+  const std::int64_t edges = H * (N - 1) / (parameters.graph.directed() ? 1 : 2);
+  const std::int64_t graph_and_cost = edges + H + H * D + H * (N - 1);
+  const std::int64_t dynamics_and_disturbance = H + 4 * H * D;
   const std::int64_t switches = 3;  // robust, perturbed, allow_disconnected
   const std::int64_t W0 = static_cast<std::int64_t>(parameters.initial.W.size());
-  const std::int64_t initial_state = 2 * N * D + N * N * D + W0;  // x0, z0 or v0, y0
+  const std::int64_t initial_state = 2 * H * D + H * N * D + W0;  // x0, z0 or v0, y0
   const std::int64_t tolerances = 2;
-  const std::int64_t states = (2 + N + q) * N * D;  // x, z or v, y, W
-  const std::int64_t signals = 6 * N * D + N;       // d_ext, u, x_star, W_norm2, phi, nn, cost
-  const std::int64_t measures = 3 + 3 + N;          // errors and gradient, solver work, order
+  const std::int64_t states = (2 + N + q) * H * D;         // x, z or v, y, W
+  const std::int64_t signals = 6 * H * D + H;              // d_ext, u, x_star, W_norm2, phi, nn, cost
+  const std::int64_t measures = 3 + 3 + H;                 // errors and gradient, solver work, order
+  const std::int64_t from_others = (N - H) * (N + 3) * D;  // y, xbar, x and v
   return gains + network + graph_and_cost + dynamics_and_disturbance + switches + initial_state + tolerances + states +
-         signals + measures;
+         signals + measures + from_others;
 }
 
 Expose read_expose(const TomlEntry& expose, const Parameters& parameters) {
@@ -392,10 +446,14 @@ Expose read_expose(const TomlEntry& expose, const Parameters& parameters) {
   return text == "all" ? Expose::all : Expose::outputs;
 }
 
-std::vector<std::string> read_names(const TomlEntry& players, int count) {
+std::vector<std::string> read_names(const TomlEntry& players, const Shape& shape) {
   std::vector<std::string> names;
   std::set<std::string> seen;
-  for (int i = 0; i < count; ++i) {
+  for (int i = 0; i < shape.players; ++i) {
+    if (shape.host_number(i) < 0) {
+      names.emplace_back();
+      continue;
+    }
     const TomlEntry name = players.item(at(i))["name"];
     names.push_back(name.text());
     if (names.back().empty()) name.fail("a name that is not empty");
@@ -433,41 +491,44 @@ Game parse_game(std::string_view toml) {
   const TomlEntry tables = game["player"];
   const TomlEntry defaults = game["defaults"];
   defaults.accept_keys(std::span(player_keys).subspan(1));  // a name is a player's own
+  read_players(tables, defaults, shape);
   std::vector<PlayerTable> players;
-  for (int i = 0; i < shape.players; ++i) {
-    tables.item(at(i)).accept_keys(player_keys);
-    players.emplace_back(tables.item(at(i)), defaults);
-    shape.order.push_back(players.back()["order"].integer(1, 2));
-  }
-  const std::vector<std::string> names = read_names(tables, shape.players);
+  for (int i = 0; i < shape.players; ++i) players.emplace_back(tables.item(at(i)), defaults);
+  const std::vector<std::string> names = read_names(tables, shape);
 
   NamedParameters named = read_named_parameters(game["parameters"]);
   const ExpressionReader expressions(toml, shape, named);
-  QuadraticCost cost(shape.players, shape.dimension);
-  PolynomialDynamics dynamics(shape.players, shape.dimension);
-  SinusoidalDisturbance disturbance(shape.players, shape.dimension);
+  QuadraticCost cost(shape);
+  PolynomialDynamics dynamics(shape);
+  SinusoidalDisturbance disturbance(shape);
   std::vector<ExpressionCost::Text> costs;
-  const PlayerExpressions none(n, shape.players, n, static_cast<int>(named.values.size()));
+  const PlayerExpressions none(shape.own_entries(), shape.hosts(), n, static_cast<int>(named.values.size()));
   PlayerExpressions dynamics_values = none;
   PlayerExpressions disturbance_values = none;
   Gains gains = read_gains(game["gains"], shape.players);
   InitialState initial{.x = std::vector<Real>(at(n)),
                        .reference = std::vector<Real>(at(n)),
-                       .y = std::vector<Real>(at(shape.players) * at(n))};
-  for (int i = 0; i < shape.players; ++i) {
+                       .y = std::vector<Real>(at(shape.hosts()) * at(n))};
+  for (int h = 0; h < shape.hosts(); ++h) {
+    const int i = shape.host(h);
     const PlayerTable& player = players[at(i)];
     read_own_gains(player, i, shape, gains);
     read_actions(player, i, shape, initial);
     read_coefficients(player["cost"], i, shape, cost.coefficients);
+    costs.push_back(expressions.cost(player["cost"]["expression"], i));
+    if (!shape.has_plant(i)) {
+      refuse_plant(player, i);
+      continue;
+    }
     read_coefficients(player["dynamics"], i, shape, dynamics.coefficients);
     read_coefficients(player["disturbance"], i, shape, disturbance.coefficients);
-    costs.push_back(expressions.cost(player["cost"]["expression"], i));
     expressions.add_coordinates(player["dynamics"]["expression"], Purpose::dynamics, i, dynamics_values);
     expressions.add_coordinates(player["disturbance"]["expression"], Purpose::disturbance, i, disturbance_values);
   }
-  for (int i = 0; i < shape.players; ++i) {
-    read_estimates(players[at(i)]["y0"], i, shape, initial);
-    read_weights(players[at(i)]["W0"], i, shape, initial);
+  for (int h = 0; h < shape.hosts(); ++h) {
+    const PlayerTable& player = players[at(shape.host(h))];
+    read_estimates(player["y0"], h, shape, initial);
+    read_weights(player["W0"], shape.host(h), shape, initial);
   }
   dynamics_values.compile();
   disturbance_values.compile();
@@ -481,10 +542,10 @@ Game parse_game(std::string_view toml) {
                            .gains = std::move(gains),
                            .strategy = read_strategy(game["strategy"]),
                            .rbf = read_networks(rbf, players, shape),
-                           .graph = read_graph(game["graph"], shape.players),
+                           .graph = read_graph(game["graph"], shape),
                            .cost = family_of<Cost, ExpressionCost>(std::move(cost), has_any(costs), shape, costs),
                            .dynamics = family_of<UnknownDynamics, ExpressionDynamics>(
-                               std::move(dynamics), !dynamics_values.empty(), shape, dynamics_values),
+                               std::move(dynamics), !dynamics_values.empty(), dynamics_values),
                            .disturbance = family_of<Disturbance, ExpressionDisturbance>(
                                std::move(disturbance), !disturbance_values.empty(), disturbance_values),
                            .initial = std::move(initial),
@@ -493,7 +554,9 @@ Game parse_game(std::string_view toml) {
   read.expose = read_expose(game["expose"], read.parameters);
   read.parameters.refresh();
   require_bounded_weights(read.parameters);
-  nash_equilibrium(*read.parameters.cost, shape, read.parameters.guess);  // throws when it is not unique
+  if (shape.hosts_all()) {
+    nash_equilibrium(*read.parameters.cost, shape, read.parameters.guess);  // throws when it is not unique
+  }
   return read;
 }
 

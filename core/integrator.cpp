@@ -30,7 +30,7 @@ using Cvode = std::unique_ptr<void, FreeCvode>;
 
 class Integrator::Implementation final : NewtonSystem {
  public:
-  Implementation(const ClosedLoop& loop, const ExternalDisturbance& input, std::unique_ptr<NewtonSolver> newton);
+  Implementation(const ClosedLoop& loop, const Inputs& inputs, std::unique_ptr<NewtonSolver> newton);
 
   void start(Real t, Tolerances tolerances);
   void restart(bool parameters_changed);
@@ -50,7 +50,8 @@ class Integrator::Implementation final : NewtonSystem {
   bool handle_event();
   void present(Real t);
   void interpolate(Real t, Real* state);
-  void settle(Real* state);
+  void settle(Real t, Real* state);
+  const Real* inputs_at(Real t);
   void require_usable_rates(Real t, const Real* state);
   [[noreturn]] void fail(int flag, Real t);
   [[noreturn]] void stop(Real t, const Real* state, const std::string& reason);
@@ -59,7 +60,7 @@ class Integrator::Implementation final : NewtonSystem {
   // CVODE's callbacks
   int rate(Real t, const Real* state, Real* rate) noexcept override;
   int finite_rate(Real t, const Real* state, Real* rate) noexcept;
-  int event_functions(const Real* state, Real* values) noexcept;
+  int event_functions(Real t, const Real* state, Real* values) noexcept;
   int newton_matrix(const Real* state, Real gamma) noexcept;
   int solve(Real* b) noexcept override;
   bool linearization_holds(const Real* state, Real gamma, const Real* weight, Real tolerance) noexcept override;
@@ -76,7 +77,7 @@ class Integrator::Implementation final : NewtonSystem {
   }
 
   const ClosedLoop& loop_;
-  const ExternalDisturbance& input_;
+  const Inputs& inputs_;
   std::unique_ptr<NewtonSolver> newton_;
   LoopJacobian jacobian_;
   RobustLayer layer_;
@@ -105,7 +106,7 @@ class Integrator::Implementation final : NewtonSystem {
 
   // scratch
   Signals signals_;
-  AlignedVector d_ext_;
+  AlignedVector input_values_;  // where they were needed last
   AlignedVector norm2_;
   AlignedVector rate_;
   AlignedVector event_values_;
@@ -122,25 +123,25 @@ class Integrator::Implementation final : NewtonSystem {
   Cvode cvode_;
 };
 
-Integrator::Implementation::Implementation(const ClosedLoop& loop, const ExternalDisturbance& input,
+Integrator::Implementation::Implementation(const ClosedLoop& loop, const Inputs& inputs,
                                            std::unique_ptr<NewtonSolver> newton)
     : loop_(loop),
-      input_(input),
+      inputs_(inputs),
       newton_(std::move(newton)),
       jacobian_(loop),
       layer_(loop),
       size_(loop.layout().size()),
       most_steps_between_restarts_(most_steps_between_restarts(size_)),
       restart_state_(at(size_)),
-      restart_modes_(at(loop.shape().actions())),
-      event_columns_(at(loop.shape().actions())),
+      restart_modes_(at(loop.shape().own_entries())),
+      event_columns_(at(loop.shape().own_entries())),
       state_(at(size_)),
-      modes_(at(loop.shape().actions())),
+      modes_(at(loop.shape().own_entries())),
       signals_(loop.shape()),
-      d_ext_(at(loop.shape().actions())),
-      norm2_(at(loop.shape().actions())),
+      input_values_(at(loop.inputs().size())),
+      norm2_(at(loop.shape().own_entries())),
       rate_(at(size_)),
-      event_values_(at(loop.shape().actions())),
+      event_values_(at(loop.shape().own_entries())),
       context_(make_context()),
       vector_(make_vector(size_, context_.get())),
       matrix_(make_placeholder_matrix(context_.get())),
@@ -196,10 +197,10 @@ Integrator::Implementation::Implementation(const ClosedLoop& loop, const Externa
                            }),
           "CVodeSetLinSysFn");
   require(CVodeSetNonlinearSolver(memory, iteration_.handle()), "CVodeSetNonlinearSolver");
-  const int columns = loop.shape().actions();
+  const int columns = loop.shape().own_entries();
   require(CVodeRootInit(memory, columns,
-                        [](SunReal, N_Vector y, SunReal* values, void* self) {
-                          return static_cast<Self>(self)->event_functions(N_VGetArrayPointer(y), values);
+                        [](SunReal t, N_Vector y, SunReal* values, void* self) {
+                          return static_cast<Self>(self)->event_functions(t, N_VGetArrayPointer(y), values);
                         }),
           "CVodeRootInit");
   std::vector<int> rising(at(columns), 1);
@@ -218,10 +219,14 @@ Integrator::Implementation::Implementation(const ClosedLoop& loop, const Externa
   CVodeSetMaxConvFails(memory, 50);
 }
 
+const Real* Integrator::Implementation::inputs_at(Real t) {
+  inputs_.values(t, input_values_.data());
+  return input_values_.data();
+}
+
 int Integrator::Implementation::rate(Real t, const Real* state, Real* rate) noexcept {
   return guarded([&] {
-    input_.values(t, d_ext_.data());
-    loop_.evaluate(t, state, d_ext_.data(), modes_, signals_, rate);
+    loop_.evaluate(t, state, inputs_at(t), modes_, signals_, rate);
     return 0;
   });
 }
@@ -232,9 +237,9 @@ int Integrator::Implementation::finite_rate(Real t, const Real* state, Real* rat
   return std::isfinite(kernels().dot(size_, rate, rate)) ? 0 : 1;  // 1: CVODE tries a smaller step
 }
 
-int Integrator::Implementation::event_functions(const Real* state, Real* values) noexcept {
+int Integrator::Implementation::event_functions(Real t, const Real* state, Real* values) noexcept {
   return guarded([&] {
-    loop_.event_functions(state, modes_, tolerances_.relative, signals_, values);
+    loop_.event_functions(state, inputs_at(t), modes_, tolerances_.relative, signals_, values);
     std::copy_n(values, event_values_.size(), event_values_.begin());
     return 0;
   });
@@ -242,8 +247,8 @@ int Integrator::Implementation::event_functions(const Real* state, Real* values)
 
 int Integrator::Implementation::newton_matrix(const Real* state, Real gamma) noexcept {
   return guarded([&] {
-    // CVODE factorizes right after an evaluation at the same state: the signals belong to it
-    jacobian_.linearize(state, signals_, modes_);
+    // CVODE factorizes right after an evaluation at the same time and state: inputs and signals belong to it
+    jacobian_.linearize(state, loop_.plants(state, input_values_.data(), signals_), signals_, modes_);
     ++newton_setups_;
     return newton_->factor(jacobian_, gamma) ? 0 : 1;
   });
@@ -252,11 +257,11 @@ int Integrator::Implementation::newton_matrix(const Real* state, Real gamma) noe
 // Apart from the robust term, all is nearly linear within a step.
 bool Integrator::Implementation::linearization_holds(const Real* state, Real gamma, const Real* weight,
                                                      Real tolerance) noexcept {
-  return layer_.linearization_holds(jacobian_, signals_, state, gamma, weight, tolerance);
+  return layer_.linearization_holds(jacobian_, signals_, state, input_values_.data(), gamma, weight, tolerance);
 }
 
 bool Integrator::Implementation::stop_correction(Real* state) noexcept {
-  return layer_.stop_in_the_middle(signals_, state);
+  return layer_.stop_in_the_middle(signals_, input_values_.data(), state);
 }
 
 int Integrator::Implementation::solve(Real* b) noexcept {
@@ -275,7 +280,7 @@ void Integrator::Implementation::stop(Real t, const Real* state, const std::stri
 void Integrator::Implementation::require_usable_rates(Real t, const Real* state) {
   const int result = finite_rate(t, state, rate_.data());
   if (failure_) std::rethrow_exception(std::exchange(failure_, nullptr));
-  if (result != 0) stop(t, state, unusable_rate(loop_, d_ext_.data(), signals_, rate_.data()));
+  if (result != 0) stop(t, state, unusable_rate(loop_, input_values_.data(), signals_, rate_.data()));
 }
 
 /// CVODE has left the state at time t in its vector.
@@ -322,13 +327,13 @@ void Integrator::Implementation::begin_at_restart_point() {
 }
 
 /// The state as it is seen from outside: projected, and never further out than the bound allows.
-void Integrator::Implementation::settle(Real* state) {
+void Integrator::Implementation::settle(Real t, Real* state) {
   if (!loop_.parameters().strategy.robust) return;
   loop_.weight_norms(state, norm2_.data());
   for (std::size_t p = 0; p < norm2_.size(); ++p) {
     largest_raw_excess_ = std::max(largest_raw_excess_, norm2_[p] / loop_.gains().W_max[p] - 1.0);
   }
-  loop_.project(modes_, signals_, state);
+  loop_.project(modes_, inputs_at(t), signals_, state);
 }
 
 void Integrator::Implementation::start(Real t, Tolerances tolerances) {
@@ -345,7 +350,7 @@ void Integrator::Implementation::start(Real t, Tolerances tolerances) {
   jacobian_.refresh();
   newton_->refresh(jacobian_);
   require_usable_rates(t, state_.data());
-  loop_.resolve_modes(state_.data(), tolerances_.relative, signals_, modes_);
+  loop_.resolve_modes(state_.data(), inputs_at(t), tolerances_.relative, signals_, modes_);
   restart_state_ = state_;
   restart_modes_ = modes_;
   begin_at_restart_point();
@@ -358,7 +363,7 @@ void Integrator::Implementation::restart(bool parameters_changed) {
     newton_->refresh(jacobian_);
   }
   require_usable_rates(time_, state_.data());
-  loop_.resolve_modes(state_.data(), tolerances_.relative, signals_, modes_);
+  loop_.resolve_modes(state_.data(), inputs_at(time_), tolerances_.relative, signals_, modes_);
   restart_time_ = time_;
   restart_state_ = state_;
   restart_modes_ = modes_;
@@ -407,8 +412,8 @@ bool Integrator::Implementation::handle_event() {
   const Real t = event_time_;
   Real* state = N_VGetArrayPointer(vector_.get());
   interpolate(t, state);
-  settle(state);
-  loop_.evaluate_seeking(state, signals_);
+  settle(t, state);
+  loop_.evaluate_seeking(state, inputs_at(t), signals_);
   bool restarts = steps_since_restart_ >= most_steps_between_restarts_;
   for (std::size_t p = 0; p < modes_.size(); ++p) {
     if (event_columns_[p] == 0) continue;
@@ -418,7 +423,7 @@ bool Integrator::Implementation::handle_event() {
   }
   if (!restarts) return false;
   restart_statistics_ = statistics();
-  loop_.project(modes_, signals_, state);
+  loop_.project(modes_, inputs_at(t), signals_, state);
   std::copy_n(state, size_, restart_state_.begin());
   restart_time_ = t;
   restart_modes_ = modes_;
@@ -438,7 +443,7 @@ void Integrator::Implementation::interpolate(Real t, Real* state) {
 
 void Integrator::Implementation::present(Real t) {
   interpolate(t, state_.data());
-  if (steps_since_restart_ != 0) settle(state_.data());
+  if (steps_since_restart_ != 0) settle(t, state_.data());
   time_ = t;
 }
 
@@ -532,9 +537,8 @@ bool Integrator::Implementation::restore(const Checkpoint& checkpoint, Tolerance
   return false;
 }
 
-Integrator::Integrator(const ClosedLoop& loop, const ExternalDisturbance& input,
-                       std::unique_ptr<NewtonSolver> newton_solver)
-    : implementation_(std::make_unique<Implementation>(loop, input, std::move(newton_solver))) {}
+Integrator::Integrator(const ClosedLoop& loop, const Inputs& inputs, std::unique_ptr<NewtonSolver> newton_solver)
+    : implementation_(std::make_unique<Implementation>(loop, inputs, std::move(newton_solver))) {}
 Integrator::~Integrator() = default;
 
 // about half a second of repetition; a restart costs some 25 steps, so large games pay a few percent for it

@@ -13,7 +13,7 @@
 #include <memory>
 
 #include "closed_loop.hpp"
-#include "external_disturbance.hpp"
+#include "loop/inputs.hpp"
 #include "newton_solver.hpp"
 
 namespace mixed_order_game {
@@ -49,8 +49,8 @@ struct Checkpoint {
 
 class Integrator {
  public:
-  /// The loop and the input are read at every evaluation and must outlive the integrator.
-  Integrator(const ClosedLoop& loop, const ExternalDisturbance& input, std::unique_ptr<NewtonSolver> newton_solver);
+  /// The loop and the inputs are read at every evaluation and must outlive the integrator.
+  Integrator(const ClosedLoop& loop, const Inputs& inputs, std::unique_ptr<NewtonSolver> newton_solver);
   ~Integrator();
   Integrator(const Integrator&) = delete;
   Integrator& operator=(const Integrator&) = delete;

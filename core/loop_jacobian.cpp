@@ -5,9 +5,9 @@
 namespace mixed_order_game {
 
 LoopJacobian::LoopJacobian(const ClosedLoop& loop)
-    : weights(at(loop.shape().neurons) * at(loop.shape().actions())),
+    : weights(at(loop.shape().neurons) * at(loop.shape().own_entries())),
       activation(weights.size()),
-      error(at(loop.shape().actions())),
+      error(at(loop.shape().own_entries())),
       network(error.size()),
       slope(error.size()),
       inverse_bound(error.size()),
@@ -22,14 +22,14 @@ void LoopJacobian::refresh() {
   dynamics_by_velocity.resize(at(parameters.dynamics->velocity_pattern().entries()));
 }
 
-void LoopJacobian::linearize(const Real* state, const Signals& signals, const Modes& modes) {
+void LoopJacobian::linearize(const Real* state, const Plants& plants, const Signals& signals, const Modes& modes) {
   const Parameters& parameters = loop_->parameters();
   const StateLayout& layout = loop_->layout();
   const int n = loop_->shape().actions();
   parameters.cost->hessian_rows(state + layout.estimates(), n, hessian.data());
   if (parameters.strategy.perturbed) {
-    parameters.dynamics->jacobian(state + layout.x(), state + layout.reference(), dynamics.data());
-    parameters.dynamics->velocity_jacobian(state + layout.x(), state + layout.reference(), dynamics_by_velocity.data());
+    parameters.dynamics->jacobian(plants.x, plants.reference, dynamics.data());
+    parameters.dynamics->velocity_jacobian(plants.x, plants.reference, dynamics_by_velocity.data());
   } else {
     std::fill(dynamics.begin(), dynamics.end(), 0.0);
     std::fill(dynamics_by_velocity.begin(), dynamics_by_velocity.end(), 0.0);

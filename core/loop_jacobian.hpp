@@ -13,12 +13,12 @@ class LoopJacobian {
   /// Takes over changed parameters and their sparsity patterns.
   void refresh();
 
-  /// Linearizes at a state; signals are those of ClosedLoop::evaluate_seeking at the same state.
-  void linearize(const Real* state, const Signals& signals, const Modes& modes);
+  /// Linearizes at a state; plants and signals are those of ClosedLoop::evaluate_seeking at the same state.
+  void linearize(const Real* state, const Plants& plants, const Signals& signals, const Modes& modes);
 
   [[nodiscard]] const ClosedLoop& loop() const { return *loop_; }
 
-  /// The numbers it is made of, indexed by entry(i, l) unless said otherwise.
+  /// The numbers it is made of, indexed by own entries unless said otherwise.
   AlignedVector weights;               ///< W
   AlignedVector activation;            ///< S
   AlignedVector error;                 ///< e

@@ -30,13 +30,27 @@ struct RbfNetwork {
 
   /// Number of the row that is centre m of player i.
   [[nodiscard]] std::size_t row(int m, int i) const { return per_player ? at(m) * width.size() + at(i) : at(m); }
+  /// The centers of the hosted players alone, in the same order.
+  [[nodiscard]] std::vector<Real> centers_of_hosts(const Shape& shape) const {
+    if (!diagonal && !per_player) return centers;
+    std::vector<Real> own;
+    const std::size_t length = diagonal ? 1 : at(shape.actions());
+    for (int m = 0; m < shape.neurons; ++m) {
+      for (int h = 0; h < shape.hosts(); ++h) {
+        const auto from =
+            centers.begin() + static_cast<std::ptrdiff_t>((at(m * shape.players) + at(shape.host(h))) * length);
+        own.insert(own.end(), from, from + static_cast<std::ptrdiff_t>(length));
+      }
+    }
+    return own;
+  }
 };
 
 /// Initial state.
 struct InitialState {
   std::vector<Real> x;          ///< entry(i, l)
   std::vector<Real> reference;  ///< z0 (order 1) or v0 (order 2) at entry(i, l)
-  std::vector<Real> y;          ///< i * N D + entry(j, l)
+  std::vector<Real> y;          ///< h * N D + entry(j, l) of hosted player i = host(h)
   std::vector<Real> W = {};     ///< m * N D + entry(i, l); empty: zero
 };
 
@@ -61,7 +75,7 @@ struct Parameters {
   [[nodiscard]] Parameters zero_direction() const {
     Parameters zero = *this;
     for (const auto member : Gains::members()) (zero.gains.*member).assign(at(shape.players), 0.0);
-    zero.graph = CommunicationGraph(shape.players, graph.directed());
+    zero.graph = CommunicationGraph(shape, graph.directed());
     for (GameFamily* family : zero.families()) family->coefficients.set_all_to_zero();
     for (std::vector<Real>* values : {&zero.rbf.centers, &zero.rbf.width, &zero.rbf.W_max, &zero.initial.x,
                                       &zero.initial.reference, &zero.initial.y, &zero.initial.W, &zero.named.values}) {

@@ -16,11 +16,12 @@ constexpr Real weight_of_bends = 20.0;
 }  // namespace
 
 RobustLayer::RobustLayer(const ClosedLoop& loop)
-    : loop_(loop), trial_(loop.shape()), weight_(at(loop.shape().actions())) {
+    : loop_(loop), trial_(loop.shape()), weight_(at(loop.shape().own_entries())) {
   const Shape& shape = loop.shape();
-  for (int p = 0; p < shape.actions(); ++p) {
-    const bool second = shape.is_second_order(shape.player_of(p));
-    place_.push_back((second ? loop.layout().reference() : loop.layout().x()) + p);
+  for (int p = 0; p < shape.own_entries(); ++p) {
+    const int i = shape.player_of_own(p);
+    const int place = shape.is_second_order(i) ? loop.layout().reference_of(p) : loop.layout().x_of(p);
+    place_.push_back(shape.has_plant(i) ? place : -1);
   }
 }
 
@@ -35,17 +36,17 @@ void RobustLayer::find_weights(const LoopJacobian& jacobian, Real gamma, const R
     for (std::size_t p = 0; p < columns; ++p) weight_[p] = std::max(weight_[p], activation[p] * weight_of_w[p]);
   }
   for (std::size_t p = 0; p < columns; ++p) {
-    weight_[p] = std::max(weight[place_[p]], gamma * loop_.gains().beta[p] * weight_[p]);
+    weight_[p] = place_[p] < 0 ? 0.0 : std::max(weight[place_[p]], gamma * loop_.gains().beta[p] * weight_[p]);
   }
 }
 
 bool RobustLayer::linearization_holds(const LoopJacobian& jacobian, const Signals& signals, const Real* state,
-                                      Real gamma, const Real* weight, Real tolerance) {
+                                      const Real* inputs, Real gamma, const Real* weight, Real tolerance) {
   if (!loop_.parameters().strategy.robust) return true;
   const GainRows& gains = loop_.gains();
   if (std::all_of(gains.delta.begin(), gains.delta.end(), [](Real delta) { return delta == 0.0; })) return true;
   const std::size_t columns = place_.size();
-  loop_.evaluate_errors(state, trial_);
+  loop_.evaluate_errors(state, inputs, trial_);
   find_weights(jacobian, gamma, weight);
   const auto change = [&](std::size_t p) { return trial_.error[p] - signals.error[p]; };
   const auto counted = [&](std::size_t p, Real defect) {
@@ -75,15 +76,15 @@ bool RobustLayer::linearization_holds(const LoopJacobian& jacobian, const Signal
   return largest <= tolerance;
 }
 
-bool RobustLayer::stop_in_the_middle(const Signals& signals, Real* state) {
+bool RobustLayer::stop_in_the_middle(const Signals& signals, const Real* inputs, Real* state) {
   if (!loop_.parameters().strategy.robust) return false;
-  loop_.evaluate_errors(state, trial_);
+  loop_.evaluate_errors(state, inputs, trial_);
   loop_.evaluate_robust_term(trial_);
   bool stopped = false;
   for (std::size_t p = 0; p < place_.size(); ++p) {
     const Real before = signals.robust[p];
     const Real now = trial_.robust[p];
-    if (!(before * now < 0.0 && std::fabs(now - before) > 0.5 * loop_.gains().delta[p])) continue;
+    if (place_[p] < 0 || !(before * now < 0.0 && std::fabs(now - before) > 0.5 * loop_.gains().delta[p])) continue;
     state[place_[p]] -= trial_.error[p];
     stopped = true;
   }

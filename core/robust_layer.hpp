@@ -18,19 +18,21 @@ class RobustLayer {
   /// Signals belong to the state that the last correction set out from, slopes to the factorized Jacobian. A solution
   /// follows a defect by 1 / (1 + gamma slope) of it, with the lesser of the slopes foretold and found.
   [[nodiscard]] bool linearization_holds(const LoopJacobian& jacobian, const Signals& signals, const Real* state,
-                                         Real gamma, const Real* weight, Real tolerance);
+                                         const Real* inputs, Real gamma, const Real* weight, Real tolerance);
 
   /// Stops columns that a correction, which set out from the signals' state, carried across the layer: puts them in its
   /// middle e = 0 by their velocity or (order 1) action. False when there was none. On either side of the middle
   /// e + a phi(e) is concave or convex, so that Newton's iteration with a Jacobian of its own at each iterate converges
   /// from there without another crossing.
-  bool stop_in_the_middle(const Signals& signals, Real* state);
+  bool stop_in_the_middle(const Signals& signals, const Real* inputs, Real* state);
 
  private:
   void find_weights(const LoopJacobian& jacobian, Real gamma, const Real* weight);
 
   const ClosedLoop& loop_;
-  std::vector<int> place_;  // per column: where the state holds the number that its error follows one to one
+  // per column: where the state holds the number that its error follows one to one; -1 where the plant is outside,
+  // so that the robust term enters no rate
+  std::vector<int> place_;
   Signals trial_;
   AlignedVector weight_;  // per column
 };

@@ -13,22 +13,22 @@ namespace mixed_order_game {
 /// sphere changes nothing in the rates.
 using Modes = std::vector<std::uint8_t>;
 
-/// Filled by ClosedLoop::evaluate. Vectors are indexed by entry(i, l) unless said otherwise.
+/// Filled by ClosedLoop::evaluate. Vectors are indexed by own entries unless said otherwise.
 struct Signals {
   explicit Signals(const Shape& shape)
       : shared(at(shape.actions())),
-        gradient(at(shape.actions())),
-        error(at(shape.actions())),
-        network(at(shape.actions())),
-        robust(at(shape.actions())),
-        dynamics(at(shape.actions())),
-        disturbance(at(shape.actions())),
-        control(at(shape.actions())),
-        radial(at(shape.actions())),
-        exponent(at(shape.players) * at(shape.neurons + 2) + 8),
-        activation(at(shape.actions()) * at(shape.neurons)) {}
+        gradient(at(shape.own_entries())),
+        error(at(shape.own_entries())),
+        network(at(shape.own_entries())),
+        robust(at(shape.own_entries())),
+        dynamics(at(shape.own_entries())),
+        disturbance(at(shape.own_entries())),
+        control(at(shape.own_entries())),
+        radial(at(shape.own_entries())),
+        exponent(at(shape.hosts()) * at(shape.neurons + 2) + 8),
+        activation(at(shape.own_entries()) * at(shape.neurons)) {}
 
-  AlignedVector shared;       ///< xbar: z (order 1) or x (order 2)
+  AlignedVector shared;       ///< xbar: z (order 1) or x (order 2), at entry(i, l); 0 where it is not known
   AlignedVector gradient;     ///< grad_i f_i(y_i)
   AlignedVector error;        ///< e
   AlignedVector network;      ///< w'S
@@ -38,7 +38,9 @@ struct Signals {
   AlignedVector control;      ///< u
   AlignedVector radial;       ///< w'S / W_max on the sphere while e w'S >= 0, else 0
   AlignedVector exponent;     ///< scratch
-  AlignedVector activation;   ///< S_m(y_i) at m * N D + entry(i, l)
+  AlignedVector actions;      ///< scratch of ClosedLoop::plants
+  AlignedVector references;   ///< likewise
+  AlignedVector activation;   ///< S_m(y_i) at m * H D + own entry
 };
 
 }  // namespace mixed_order_game

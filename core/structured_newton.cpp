@@ -5,10 +5,10 @@
 //  2. the estimates: dy_i = B^-1 b + T_i dxbar by EstimateBlocks;
 //  3. velocities and references, which follow from the actions.
 //
-// What remains is a sparse core system of at most 2 N D unknowns: dxbar, and dx of the first-order players. The
-// derivatives of the activations with respect to the estimates are left out (dS = 0): they would make it full. Measured
-// at N = 2 to 200 and widths from 0.3 to 7, CVODE needs the same number of iterations without them, and each costs
-// less.
+// What remains is a sparse core system of at most 2 H D unknowns: dxbar of the hosted players, and dx of the
+// first-order ones (a hosted player whose plant is outside has dz alone, or nothing). The derivatives of the
+// activations with respect to the estimates are left out (dS = 0): they would make it full. Measured at N = 2 to 200
+// and widths from 0.3 to 7, CVODE needs the same number of iterations without them, and each costs less.
 #include <algorithm>
 #include <optional>
 
@@ -40,15 +40,26 @@ class StructuredNewton final : public NewtonSolver {
   std::optional<CoreSystem> core_;
 
   // sizes
-  int n_ = 0;                         // N D
-  std::vector<int> player_;           // per entry
+  int n_ = 0;                         // H D, own entries
+  int joint_ = 0;                     // N D
+  std::vector<int> host_;             // per entry: number of its player among the hosted ones
   std::vector<std::uint8_t> second_;  // per entry: order 2
+  std::vector<std::uint8_t> plant_;   // per entry: the loop has its plant
   std::vector<int> velocity_driven_;  // entries of order 1
   std::vector<int> accelerated_;      // entries of order 2
   std::vector<int> all_;
-  std::vector<int> first_order_;   // per entry: number of dx in the core system, -1 for order 2
-  std::vector<int> shared_place_;  // per entry: place of dxbar in the core system
-  std::vector<int> action_place_;  // per entry: place of dx
+  std::vector<int> moving_;   // entries whose plants the loop has
+  std::vector<int> sharing_;  // entries whose shared signals are unknowns
+  std::vector<int> entry_;    // per entry: where it lies in a joint action
+  // per entry, -1 where there is none: of order 2, dx is dxbar
+  std::vector<int> shared_unknown_;  // number of dxbar in the core system
+  std::vector<int> action_unknown_;  // number of dx
+  std::vector<int> shared_place_;    // place of dxbar in the core system
+  std::vector<int> action_place_;    // place of dx
+  std::vector<int> x_;               // place of x in the state
+  std::vector<int> reference_;       // place of z or v
+  // the same per entry of a joint action
+  std::vector<int> joint_shared_unknown_, joint_action_unknown_, joint_x_;
   std::vector<int> hessian_gain_;  // per entry of the Hessian rows: where its dy_i / dxbar lies
 
   // weights; all per column p
@@ -64,69 +75,104 @@ class StructuredNewton final : public NewtonSolver {
   // one solve
   AlignedVector network_rhs_;  // h
   AlignedVector core_rhs_;
-  AlignedVector shared_;    // dxbar
+  AlignedVector shared_;    // dxbar, joint
   AlignedVector gradient_;  // Hessian rows times dy
   AlignedVector error_change_, from_error_, onto_weight_;
-  AlignedVector velocity_;  // b_x, then dv
+  AlignedVector velocity_;  // b_x, then dv; joint
 };
 
 void StructuredNewton::refresh(const LoopJacobian& jacobian) {
   jacobian_ = &jacobian;
   const Parameters& parameters = loop().parameters();
   const Shape& shape = parameters.shape;
-  n_ = shape.actions();
-  blocks_.analyse(parameters.graph, parameters.gains.k3, shape.dimension);
-  player_.resize(at(n_));
-  second_.resize(at(n_));
-  first_order_.resize(at(n_));
-  for (std::vector<int>* entries : {&velocity_driven_, &accelerated_, &all_}) entries->clear();
-  int unknowns = n_;
+  const StateLayout& layout = loop().layout();
+  n_ = shape.own_entries();
+  joint_ = shape.actions();
+  blocks_.analyse(parameters.graph, loop().gains().k3, shape.dimension);
+  for (std::vector<int>* numbers : {&host_, &shared_unknown_, &action_unknown_, &x_, &reference_, &velocity_driven_,
+                                    &accelerated_, &all_, &moving_, &sharing_, &entry_}) {
+    numbers->clear();
+  }
+  second_.clear();
+  plant_.clear();
+  int unknowns = 0;
   for (int p = 0; p < n_; ++p) {
-    player_[at(p)] = shape.player_of(p);
-    second_[at(p)] = shape.is_second_order(shape.player_of(p)) ? 1 : 0;
-    first_order_[at(p)] = second_[at(p)] != 0 ? -1 : unknowns++;
+    const int i = shape.player_of_own(p);
+    const bool second = shape.is_second_order(i);
+    const bool plant = shape.has_plant(i);
+    host_.push_back(p % shape.hosts());
+    second_.push_back(second ? 1 : 0);
+    plant_.push_back(plant ? 1 : 0);
+    x_.push_back(layout.x_of(p));
+    reference_.push_back(layout.reference_of(p));
+    shared_unknown_.push_back(second && !plant ? -1 : unknowns++);
+    entry_.push_back(shape.entry_of_own(p));
     all_.push_back(p);
-    (second_[at(p)] != 0 ? accelerated_ : velocity_driven_).push_back(p);
+    if (plant) moving_.push_back(p);
+    if (shared_unknown_.back() >= 0) sharing_.push_back(p);
+    (second ? accelerated_ : velocity_driven_).push_back(p);
+  }
+  for (int p = 0; p < n_; ++p) {
+    const bool own_unknown = second_[at(p)] == 0 && plant_[at(p)] != 0;
+    action_unknown_.push_back(own_unknown ? unknowns++ : second_[at(p)] != 0 ? shared_unknown_[at(p)] : -1);
+  }
+  for (std::vector<int>* numbers : {&joint_shared_unknown_, &joint_action_unknown_, &joint_x_}) {
+    numbers->assign(at(joint_), -1);
+  }
+  for (int p = 0; p < n_; ++p) {
+    const std::size_t entry = at(entry_[at(p)]);
+    joint_shared_unknown_[entry] = shared_unknown_[at(p)];
+    joint_action_unknown_[entry] = action_unknown_[at(p)];
+    joint_x_[entry] = x_[at(p)];
   }
   const std::size_t n = at(n_);
   for (AlignedVector* vector : {&stiffness_, &inverse_driven_, &inverse_a2_, &inverse_a1_, &squares_, &network_gain_,
                                 &activation_per_error_, &weight_per_error_, &weight_per_network_, &network_rhs_,
-                                &shared_, &gradient_, &error_change_, &from_error_, &onto_weight_, &velocity_}) {
+                                &gradient_, &error_change_, &from_error_, &onto_weight_}) {
     vector->assign(n, 0.0);
   }
+  for (AlignedVector* vector : {&shared_, &velocity_}) vector->assign(at(joint_), 0.0);
   core_rhs_.assign(at(unknowns), 0.0);
 
   // the core system's sparse pattern
   std::vector<std::vector<int>> rows(at(unknowns));
   const SparseRows& hessian = parameters.cost->hessian_pattern();
   const SparseRows& dynamics = parameters.dynamics->jacobian_pattern();
+  const SparseRows& by_velocity = parameters.dynamics->velocity_pattern();
   hessian_gain_.clear();
   for (int p = 0; p < n_; ++p) {
     for (int k = hessian.start[at(p)]; k < hessian.start[at(p + 1)]; ++k) {
-      hessian_gain_.push_back(player_[at(p)] * shape.players + player_[at(hessian.column[at(k)])]);
+      hessian_gain_.push_back(host_[at(p)] * shape.players + shape.player_of(hessian.column[at(k)]));
     }
   }
+  const auto add_known = [](std::vector<int>& row, int unknown) {
+    if (unknown >= 0) row.push_back(unknown);
+  };
   for (int p = 0; p < n_; ++p) {
-    const int driven = second_[at(p)] != 0 ? p : first_order_[at(p)];
-    rows[at(p)].push_back(p);
-    rows[at(driven)].push_back(p);
-    rows[at(driven)].push_back(driven);
-    for (int k = hessian.start[at(p)]; k < hessian.start[at(p + 1)]; ++k) rows[at(p)].push_back(hessian.column[at(k)]);
-    for (int k = dynamics.start[at(p)]; k < dynamics.start[at(p + 1)]; ++k) {
-      const int column = dynamics.column[at(k)];
-      rows[at(driven)].push_back(second_[at(column)] != 0 ? column : first_order_[at(column)]);
+    const int shared = shared_unknown_[at(p)];
+    if (shared < 0) continue;
+    rows[at(shared)].push_back(shared);
+    for (int k = hessian.start[at(p)]; k < hessian.start[at(p + 1)]; ++k) {
+      add_known(rows[at(shared)], joint_shared_unknown_[at(hessian.column[at(k)])]);
     }
-    const SparseRows& by_velocity = parameters.dynamics->velocity_pattern();
+    if (plant_[at(p)] == 0) continue;
+    std::vector<int>& driven = rows[at(action_unknown_[at(p)])];
+    driven.push_back(shared);
+    driven.push_back(action_unknown_[at(p)]);
+    for (int k = dynamics.start[at(p)]; k < dynamics.start[at(p + 1)]; ++k) {
+      add_known(driven, joint_action_unknown_[at(dynamics.column[at(k)])]);
+    }
     for (int k = by_velocity.start[at(p)]; k < by_velocity.start[at(p + 1)]; ++k) {
-      rows[at(driven)].push_back(by_velocity.column[at(k)]);
+      add_known(driven, joint_shared_unknown_[at(by_velocity.column[at(k)])]);
     }
   }
   core_.emplace(rows);
-  shared_place_.resize(at(n_));
-  action_place_.resize(at(n_));
+  const auto place_of = [&](int unknown) { return unknown < 0 ? -1 : core_->place(unknown); };
+  shared_place_.clear();
+  action_place_.clear();
   for (int p = 0; p < n_; ++p) {
-    shared_place_[at(p)] = core_->place(p);
-    action_place_[at(p)] = core_->place(second_[at(p)] != 0 ? p : first_order_[at(p)]);
+    shared_place_.push_back(place_of(shared_unknown_[at(p)]));
+    action_place_.push_back(place_of(action_unknown_[at(p)]));
   }
 }
 
@@ -172,33 +218,38 @@ void StructuredNewton::factor_core() {
   const SparseRows& dynamics = parameters.dynamics->jacobian_pattern();
   const AlignedVector& gain = blocks_.shared_signal_gain();
   core_->clear();
+  const auto add = [&](int row, int column, Real value) {
+    if (column >= 0) core_->add(row, column, value);
+  };
   for (int p = 0; p < n_; ++p) {
     const bool second = second_[at(p)] != 0;
+    const int shared = shared_unknown_[at(p)];
+    if (shared < 0) continue;
     const Real B = stiffness_[at(p)];
     inverse_driven_[at(p)] = 1.0 / (1.0 + gamma_ * B);
-    const int driven = second ? p : first_order_[at(p)];
+    const int driven = action_unknown_[at(p)];
     const Real weight = second ? gamma_ * gamma_ : gamma_;
     const Real gradient_weight = second ? weight * B * k2[at(p)] : gamma_ * k2[at(p)];
     for (int k = hessian.start[at(p)]; k < hessian.start[at(p + 1)]; ++k) {
       const Real T = gain[at(hessian_gain_[at(k)])];
-      core_->add(p, hessian.column[at(k)], gradient_weight * jacobian_->hessian[at(k)] * T);
+      add(shared, joint_shared_unknown_[at(hessian.column[at(k)])], gradient_weight * jacobian_->hessian[at(k)] * T);
     }
     if (second) {
-      core_->add(p, p, 1.0 + gamma_ * B);
+      core_->add(shared, shared, 1.0 + gamma_ * B);
     } else {
-      core_->add(p, p, 1.0);
+      core_->add(shared, shared, 1.0);
+      if (driven < 0) continue;
       core_->add(driven, driven, 1.0 + gamma_ * B);
-      core_->add(driven, p, -gamma_ * B);
+      core_->add(driven, shared, -gamma_ * B);
     }
     for (int k = dynamics.start[at(p)]; k < dynamics.start[at(p + 1)]; ++k) {
-      const int column = dynamics.column[at(k)];
-      core_->add(driven, second_[at(column)] != 0 ? column : first_order_[at(column)],
-                 -weight * jacobian_->dynamics[at(k)]);
+      add(driven, joint_action_unknown_[at(dynamics.column[at(k)])], -weight * jacobian_->dynamics[at(k)]);
     }
     // dv = (dx - b_x) / gamma
     const SparseRows& by_velocity = parameters.dynamics->velocity_pattern();
     for (int k = by_velocity.start[at(p)]; k < by_velocity.start[at(p + 1)]; ++k) {
-      core_->add(driven, by_velocity.column[at(k)], -(second ? gamma_ : 1.0) * jacobian_->dynamics_by_velocity[at(k)]);
+      add(driven, joint_shared_unknown_[at(by_velocity.column[at(k)])],
+          -(second ? gamma_ : 1.0) * jacobian_->dynamics_by_velocity[at(k)]);
     }
   }
 }
@@ -216,7 +267,7 @@ bool StructuredNewton::factor(const LoopJacobian& jacobian, Real gamma) {
 void StructuredNewton::apply_hessian(const std::vector<int>& rows, const Real* dy) {
   const SparseRows& hessian = loop().parameters().cost->hessian_pattern();
   for (const int p : rows) {
-    const Real* own = dy + player_[at(p)] * n_;
+    const Real* own = dy + host_[at(p)] * joint_;
     Real sum = 0.0;
     for (int k = hessian.start[at(p)]; k < hessian.start[at(p + 1)]; ++k) {
       sum += jacobian_->hessian[at(k)] * own[hessian.column[at(k)]];
@@ -233,8 +284,6 @@ void StructuredNewton::solve(Real* b) {
   const bool robust = parameters.strategy.robust;
   const AlignedVector& k2 = loop().gains().k2;
   const SparseRows& dynamics = parameters.dynamics->jacobian_pattern();
-  Real* dx = b + layout.x();
-  Real* dreference = b + layout.reference();
   Real* dy = b + layout.estimates();
   Real* dW = b + layout.weights();
   Real* h = network_rhs_.data();
@@ -259,43 +308,56 @@ void StructuredNewton::solve(Real* b) {
     return dg;
   };
   const bool has_velocities = parameters.dynamics->velocity_pattern().entries() != 0;
-  if (has_velocities) std::copy_n(dx, n_, velocity_.begin());
+  if (has_velocities) {
+    for (int k = 0; k < joint_; ++k) velocity_[at(k)] = joint_x_[at(k)] < 0 ? 0.0 : b[joint_x_[at(k)]];
+  }
   for (const int p : velocity_driven_) {
-    core_rhs_[at(shared_place_[at(p)])] = dreference[p] - gamma_ * k2[at(p)] * gradient_[at(p)];
-    core_rhs_[at(action_place_[at(p)])] = dx[p] - gamma_ * h[p];
+    core_rhs_[at(shared_place_[at(p)])] = b[reference_[at(p)]] - gamma_ * k2[at(p)] * gradient_[at(p)];
+    if (plant_[at(p)] == 0) continue;
+    core_rhs_[at(action_place_[at(p)])] = b[x_[at(p)]] - gamma_ * h[p];
     if (has_velocities) core_rhs_[at(action_place_[at(p)])] -= along_velocities(p, velocity_.data());
   }
   for (const int p : accelerated_) {
+    if (plant_[at(p)] == 0) continue;
     const Real B = stiffness_[at(p)];
     const Real known = h[p] + B * k2[at(p)] * gradient_[at(p)];
-    core_rhs_[at(shared_place_[at(p)])] = (1.0 + gamma_ * B) * dx[p] + gamma_ * (dreference[p] - gamma_ * known);
+    core_rhs_[at(shared_place_[at(p)])] =
+        (1.0 + gamma_ * B) * b[x_[at(p)]] + gamma_ * (b[reference_[at(p)]] - gamma_ * known);
     if (has_velocities) core_rhs_[at(shared_place_[at(p)])] -= gamma_ * along_velocities(p, velocity_.data());
   }
   core_->solve(core_rhs_.data());
 
   // back to estimates, actions, references and velocities
-  for (int p = 0; p < n_; ++p) {
-    shared_[at(p)] = core_rhs_[at(shared_place_[at(p)])];
-    dx[p] = core_rhs_[at(action_place_[at(p)])];
-  }
+  for (const int p : sharing_) shared_[at(entry_[at(p)])] = core_rhs_[at(shared_place_[at(p)])];
+  for (const int p : moving_) b[x_[at(p)]] = core_rhs_[at(action_place_[at(p)])];
   if (has_velocities) {
-    for (int p = 0; p < n_; ++p) velocity_[at(p)] = (dx[p] - velocity_[at(p)]) / gamma_;
+    for (int k = 0; k < joint_; ++k) {
+      if (joint_x_[at(k)] >= 0) velocity_[at(k)] = (b[joint_x_[at(k)]] - velocity_[at(k)]) / gamma_;
+    }
   }
-  kernel.add_shared_signal(shape.players, shape.dimension, blocks_.shared_signal_gain().data(), shared_.data(), dy);
+  kernel.add_shared_signal(shape.hosts(), shape.players, shape.dimension, blocks_.shared_signal_gain().data(),
+                           shared_.data(), dy);
   for (const int p : velocity_driven_) {
-    dreference[p] = shared_[at(p)];
-    error_change_[at(p)] = dx[p] - dreference[p];
+    Real& dz = b[reference_[at(p)]];
+    dz = shared_[at(entry_[at(p)])];
+    error_change_[at(p)] = (plant_[at(p)] != 0 ? b[x_[at(p)]] : 0.0) - dz;
   }
   apply_hessian(accelerated_, dy);
   for (const int p : accelerated_) {
+    if (plant_[at(p)] == 0) {
+      error_change_[at(p)] = k2[at(p)] * gradient_[at(p)];
+      continue;
+    }
     Real dg = 0.0;
     for (int k = dynamics.start[at(p)]; k < dynamics.start[at(p + 1)]; ++k) {
-      dg += jacobian_->dynamics[at(k)] * dx[dynamics.column[at(k)]];
+      const int place = joint_x_[at(dynamics.column[at(k)])];
+      if (place >= 0) dg += jacobian_->dynamics[at(k)] * b[place];
     }
     if (has_velocities) dg += along_velocities(p, velocity_.data());
     const Real push = h[p] + stiffness_[at(p)] * k2[at(p)] * gradient_[at(p)] - dg;
-    dreference[p] = (dreference[p] - gamma_ * push) * inverse_driven_[at(p)];
-    error_change_[at(p)] = dreference[p] + k2[at(p)] * gradient_[at(p)];
+    Real& dv = b[reference_[at(p)]];
+    dv = (dv - gamma_ * push) * inverse_driven_[at(p)];
+    error_change_[at(p)] = dv + k2[at(p)] * gradient_[at(p)];
   }
   if (!robust) return;
 

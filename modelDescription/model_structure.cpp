@@ -20,6 +20,10 @@ class Knowns {
     for (int reference = 0; reference < variables.size(); ++reference) {
       const Family& family = variables.family(reference);
       const int slot = variables.variable(reference).slot;
+      if (family.causality == Causality::input) {
+        inputs_[slot] = reference;
+        continue;
+      }
       references_[family.name][slot] = reference;
       if (family.is_named) named_[slot] = reference;
       if (family.game_family >= 0) coefficients_[family.game_family][family.coefficient] = &references_[family.name];
@@ -38,7 +42,11 @@ class Knowns {
     return found == family->second.end() ? Dependencies(value) : parameter(*found->second, slot, value);
   }
   [[nodiscard]] Dependencies named(int slot, Real value) const { return parameter(named_, slot, value); }
-  [[nodiscard]] Dependencies input(int slot) const { return Dependencies::known(references_.at("d_ext").at(slot)); }
+  /// By its position among the inputs; nothing where it is no variable.
+  [[nodiscard]] Dependencies input(int position) const {
+    const auto found = inputs_.find(position);
+    return found == inputs_.end() ? Dependencies() : Dependencies::known(found->second);
+  }
   [[nodiscard]] Dependencies time() const { return Dependencies::known(references_.at("time").at(0)); }
 
  private:
@@ -53,6 +61,7 @@ class Knowns {
   Equations equations_;
   std::unordered_map<std::string, Slots> references_;
   Slots named_;
+  Slots inputs_;
   std::unordered_map<int, std::unordered_map<int, const Slots*>> coefficients_;
 };
 
@@ -95,15 +104,15 @@ class Analysis {
       coefficients.emplace_back(knowns_, k, families[at(k)]->coefficients);
     }
     const LoopNumbers<Dependencies> numbers = loop_numbers(coefficients);
-    loop_.evaluate_control(numbers, state_.data());
+    std::vector<Dependencies> inputs;
+    for (int k = 0; k < loop_.inputs.size(); ++k) inputs.push_back(knowns_.input(k));
+    loop_.evaluate_control(numbers, state_.data(), inputs.data());
     if (!model.variables.states().empty()) {
-      std::vector<Dependencies> d_ext;
-      for (int p = 0; p < n_; ++p) d_ext.push_back(knowns_.input(p));
       rate_.resize(state_.size());
-      const Modes on_sphere(at(n_), 1);
-      loop_.evaluate_rates(numbers, knowns_.time(), state_.data(), d_ext.data(), on_sphere, rate_.data());
+      const Modes on_sphere(at(shape_.own_entries()), 1);
+      loop_.evaluate_rates(numbers, knowns_.time(), state_.data(), inputs.data(), on_sphere, rate_.data());
     }
-    if (equations == Equations::initial) find_equilibrium(coefficients[0]);
+    if (equations == Equations::initial && shape_.hosts_all()) find_equilibrium(coefficients[0]);
   }
 
   Unknown unknown(int reference) const {
@@ -118,13 +127,14 @@ class Analysis {
     const ModelVariables& variables = model_.variables;
     const Family& family = variables.family(reference);
     const int slot = variables.variable(reference).slot;
-    if (family.state >= 0) return state_[at(family.state + slot)];
-    if (family.derivative_of >= 0) return rate_[at(variables.families()[at(family.derivative_of)].state + slot)];
+    if (family.is_state) return state_[at(slot)];
+    if (family.derivative_of >= 0) return rate_[at(slot)];
     if (family.signal == &Signals::control) return loop_.control[at(slot)];
+    if (family.name == "xbar") return loop_.shared[at(slot)];
     if (family.causality == Causality::calculated_parameter) return equilibrium(slot);
     // nash_error, of all actions and costs
     Dependencies all;
-    for (int p = 0; p < n_; ++p) all += state_[at(loop_.layout.x() + p)].nonlinear();
+    for (const Dependencies& x : loop_.x) all += x.nonlinear();
     for (const Dependencies& costs : own_costs_) all += costs;
     return all;
   }
@@ -139,16 +149,22 @@ class Analysis {
       }
       return;
     }
-    for (int p = 0; p < n_; ++p) {
-      const char* reference = shape_.is_second_order(shape_.player_of(p)) ? "v0" : "z0";
-      state_[at(layout.x() + p)] = knowns_.parameter("x0", p, initial.x[at(p)]);
-      state_[at(layout.reference() + p)] = knowns_.parameter(reference, p, initial.reference[at(p)]);
+    for (int p = 0; p < shape_.own_entries(); ++p) {
+      const int entry = shape_.entry_of_own(p);
+      const char* reference = shape_.is_second_order(shape_.player_of_own(p)) ? "v0" : "z0";
+      if (const int x = layout.x_of(p); x >= 0) state_[at(x)] = knowns_.parameter("x0", entry, initial.x[at(entry)]);
+      if (const int to = layout.reference_of(p); to >= 0) {
+        state_[at(to)] = knowns_.parameter(reference, entry, initial.reference[at(entry)]);
+      }
     }
-    for (int k = 0; k < shape_.players * n_; ++k) {
+    for (int k = 0; k < shape_.hosts() * n_; ++k) {
       state_[at(layout.estimates() + k)] = knowns_.parameter("y0", k, initial.y[at(k)]);
     }
-    for (int k = 0; k < static_cast<int>(initial.W.size()); ++k) {
-      state_[at(layout.weights() + k)] = knowns_.parameter("W0", k, initial.W[at(k)]);
+    for (int m = 0; m < shape_.neurons && !initial.W.empty(); ++m) {
+      for (int p = 0; p < shape_.own_entries(); ++p) {
+        const int slot = m * n_ + shape_.entry_of_own(p);
+        state_[at(layout.weights_of(m) + p)] = knowns_.parameter("W0", slot, initial.W[at(slot)]);
+      }
     }
   }
 
@@ -176,7 +192,8 @@ class Analysis {
       numbers.centers.push_back(rbf.diagonal ? knowns_.parameter("center", first, rbf.centers[k])
                                              : Dependencies(rbf.centers[k]));
     }
-    for (int i = 0; i < shape_.players; ++i) {
+    for (int h = 0; h < shape_.hosts(); ++h) {
+      const int i = shape_.host(h);
       auto& row = numbers.edges.emplace_back();
       for (int k = 0; k < shape_.players; ++k) {
         const Dependencies weight = knowns_.parameter("a", edge_slot(i, k), parameters_.graph.weight(i, k));
@@ -191,7 +208,7 @@ class Analysis {
 
   /// Where a_ik is a variable.
   int edge_slot(int i, int k) const {
-    if (parameters_.graph.directed()) return i * shape_.players + k;
+    if (parameters_.graph.directed() || shape_.host_number(k) < 0) return i * shape_.players + k;
     return std::min(i, k) * shape_.players + std::max(i, k);
   }
 
@@ -261,7 +278,7 @@ ModelStructure model_structure(const Model& model) {
   for (int reference = 0; reference < variables.size(); ++reference) {
     const int of = variables.family(reference).derivative_of;
     if (of < 0) continue;
-    derivatives[at(variables.families()[at(of)].state + variables.variable(reference).slot)] = reference;
+    derivatives[at(variables.variable(reference).slot)] = reference;
   }
   for (const int reference : derivatives) structure.derivatives.push_back(running.unknown(reference));
   return structure;

@@ -28,7 +28,9 @@ void append(std::string& text, Real value) {
 
 std::optional<std::string> simulated(const Model& model) {
   const std::int64_t states = StateLayout(model.game.parameters.shape).size();
-  if (states > most_states) return std::nullopt;
+  const Shape& shape = model.game.parameters.shape;
+  // what waits for signals from outside has no run of its own
+  if (states > most_states || !shape.hosts_all() || !shape.external.empty()) return std::nullopt;
   const ModelVariables& variables = model.variables;
   std::vector<std::uint32_t> outputs;
   std::string table = "\"time\"";

@@ -112,7 +112,7 @@ void ExpressionReader::add_coordinates(const TomlEntry& entry, Purpose purpose, 
     const Place place{.shape = &shape_, .parameters = &parameters_, .purpose = purpose, .player = i, .coordinate = l};
     int node = 0;
     unroll_into(is_list ? entry.item(at(l)) : entry, place, *graph, node);
-    values.add(shape_.entry(i, l), i, graph, node);
+    values.add(shape_.own_entry(shape_.host_number(i), l), shape_.host_number(i), graph, node);
   }
 }
 

@@ -42,6 +42,8 @@ class ExpressionGraph {
 
   [[nodiscard]] const GraphNode& node(int k) const { return nodes_[at(k)]; }
   [[nodiscard]] const Leaf& leaf_of(int node) const { return leaves_[at(nodes_[at(node)].a)]; }
+  /// All leaves that were asked for.
+  [[nodiscard]] const std::vector<Leaf>& leaves() const { return leaves_; }
   [[nodiscard]] int size() const { return static_cast<int>(nodes_.size()); }
   [[nodiscard]] bool is_number(int node) const { return nodes_[at(node)].operation == Operation::number; }
   /// Whether none of the leaves that it is made of is anything but a named parameter.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <map>
+#include <set>
 
 namespace mixed_order_game {
 
@@ -84,6 +85,11 @@ void PlayerExpressions::compile() {
   std::vector<PlayerResults> all;
   for (auto& [player, wanted] : results) all.push_back(std::move(wanted));
   values_ = Tapes(all);
+  std::array<std::set<int>, kinds> used;
+  for (const auto& [original, graph] : extended) {
+    for (const Leaf& leaf : original->leaves()) used[at(static_cast<int>(leaf.kind))].insert(leaf.index);
+  }
+  for (std::size_t kind = 0; kind < kinds; ++kind) used_[kind].assign(used[kind].begin(), used[kind].end());
   members_.clear();  // the graphs have served
 }
 

@@ -39,7 +39,7 @@ struct LeafValuesAs {
 class PlayerExpressions {
  public:
   PlayerExpressions() = default;
-  /// As many rows as there are slots.
+  /// As many rows as there are slots. Players are numbers of rows of points: those of hosted players.
   PlayerExpressions(int slots, int players, int actions, int parameters);
 
   /// The value at a slot is a node of the player's graph; each slot once, and compile() after the last.
@@ -57,6 +57,8 @@ class PlayerExpressions {
 
   /// Row slot: the indices of leaves of a kind along which its value changes.
   [[nodiscard]] const SparseRows& pattern(LeafKind kind) const { return patterns_[at(static_cast<int>(kind))]; }
+  /// Indices of the leaves of a kind that the texts name, ascending: more than the pattern, where a derivative is zero.
+  [[nodiscard]] const std::vector<int>& used(LeafKind kind) const { return used_[at(static_cast<int>(kind))]; }
   /// The entries of the pattern.
   void derivatives(LeafKind kind, const LeafValues& leaves, Real* entries) const;
 
@@ -85,6 +87,7 @@ class PlayerExpressions {
   std::vector<int> player_of_;  // by slot; -1 without an expression
   Tapes values_;
   std::array<SparseRows, kinds> patterns_;
+  std::array<std::vector<int>, kinds> used_;
   std::array<std::vector<Factor>, kinds> factors_;  // along the patterns
   std::array<Tapes, kinds> derivatives_;
 };

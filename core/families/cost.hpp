@@ -16,21 +16,21 @@ class Cost : public GameFamily {
   using GameFamily::GameFamily;
   [[nodiscard]] virtual std::unique_ptr<Cost> clone() const = 0;
 
-  /// f_i(x) for a joint action x of length N D.
+  /// f_i(x) of a hosted player for a joint action x of length N D.
   [[nodiscard]] virtual Real value(int i, const Real* x) const = 0;
 
-  /// gradient[entry(i, l)] = d f_i / d x_il at the joint action points + i * stride, for every player i.
-  /// A stride of N D evaluates each player at its own estimate y_i, a stride of 0 all players at one x.
+  /// gradient[own entry (h, l)] = d f_i / d x_il at the joint action points + h * stride, for every hosted player
+  /// i = host(h). A stride of N D evaluates each player at its own estimate y_i, a stride of 0 all players at one x.
   virtual void own_gradients(const Real* points, int stride, Real* gradient) const = 0;
   virtual void own_gradients(const CoefficientsAs<Dual>& coefficients, const Dual* points, int stride,
                              Dual* gradient) const = 0;
   virtual void own_gradients(const CoefficientsAs<Dependencies>& coefficients, const Dependencies* points, int stride,
                              Dependencies* gradient) const = 0;
 
-  /// Row entry(i, l): the columns entry(j, h) at which d^2 f_i / (d x_il d x_jh) may differ from zero.
+  /// Row of own entry (h, l): the columns entry(j, m) at which d^2 f_i / (d x_il d x_jm) may differ from zero.
   [[nodiscard]] virtual const SparseRows& hessian_pattern() const = 0;
 
-  /// The entries of hessian_pattern(), row entry(i, l) at the joint action points + i * stride.
+  /// The entries of hessian_pattern(), row (h, l) at the joint action points + h * stride.
   virtual void hessian_rows(const Real* points, int stride, Real* values) const = 0;
 
   /// Whether the gradients are affine, so that the Hessian is the same everywhere.

@@ -17,7 +17,7 @@ class Disturbance : public GameFamily {
   /// The absolute time [s] from which every t below counts; call refresh() after changing it.
   Real time_origin = 0.0;
 
-  /// d[entry(i, l)] = d_il(time_origin + t); t in seconds.
+  /// d[own entry] = d_il(time_origin + t) of the hosted players; t in seconds.
   virtual void values(Real t, Real* d) const = 0;
   virtual void values(const CoefficientsAs<Dual>& coefficients, const Dual& t, Dual* d) const = 0;
   virtual void values(const CoefficientsAs<Dependencies>& coefficients, const Dependencies& t,

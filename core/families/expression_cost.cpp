@@ -7,18 +7,18 @@ namespace mixed_order_game {
 ExpressionCost::ExpressionCost(QuadraticCost coefficients_of, const Shape& shape, const std::vector<Text>& texts)
     : QuadraticCost(std::move(coefficients_of)) {
   const auto parameters = static_cast<int>(coefficients.named.size());
-  values_ = PlayerExpressions(shape.players, shape.players, shape.actions(), parameters);
-  gradients_ = PlayerExpressions(shape.actions(), shape.players, shape.actions(), parameters);
-  for (int i = 0; i < shape.players; ++i) {
-    const auto& [graph, node] = texts[at(i)];
+  values_ = PlayerExpressions(shape.hosts(), shape.hosts(), shape.actions(), parameters);
+  gradients_ = PlayerExpressions(shape.own_entries(), shape.hosts(), shape.actions(), parameters);
+  for (int h = 0; h < shape.hosts(); ++h) {
+    const auto& [graph, node] = texts[at(h)];
     if (graph == nullptr) continue;
-    values_.add(i, i, graph, node);
+    values_.add(h, h, graph, node);
     const auto derivatives = graph->derivatives(node);
     for (int l = 0; l < shape.dimension; ++l) {
-      const Leaf own{LeafKind::action, shape.entry(i, l)};
+      const Leaf own{LeafKind::action, shape.entry(shape.host(h), l)};
       const auto found =
           std::find_if(derivatives.begin(), derivatives.end(), [&](const auto& along) { return along.first == own; });
-      if (found != derivatives.end()) gradients_.add(own.index, i, graph, found->second);
+      if (found != derivatives.end()) gradients_.add(shape.own_entry(h, l), h, graph, found->second);
     }
   }
   values_.compile();
@@ -28,8 +28,9 @@ ExpressionCost::ExpressionCost(QuadraticCost coefficients_of, const Shape& shape
 
 Real ExpressionCost::value(int i, const Real* x) const {
   scratch_.assign(at(values_.pattern(LeafKind::action).rows()), 0.0);
-  values_.value_of_player(i, leaves(x, 0), scratch_.data());
-  return QuadraticCost::value(i, x) + scratch_[at(i)];
+  const int h = shape().host_number(i);
+  values_.value_of_player(h, leaves(x, 0), scratch_.data());
+  return QuadraticCost::value(i, x) + scratch_[at(h)];
 }
 
 void ExpressionCost::own_gradients(const Real* points, int stride, Real* gradient) const {

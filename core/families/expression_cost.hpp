@@ -8,7 +8,7 @@ namespace mixed_order_game {
 
 class ExpressionCost final : public QuadraticCost {
  public:
-  /// A graph and a node for each player; null for players without an expression.
+  /// A graph and a node for each hosted player; null for players without an expression.
   struct Text {
     std::shared_ptr<ExpressionGraph> graph;
     int node = 0;
@@ -31,8 +31,8 @@ class ExpressionCost final : public QuadraticCost {
     return {.points = points, .stride = stride, .parameters = coefficients.named.data()};
   }
 
-  PlayerExpressions values_;     // f_i at i
-  PlayerExpressions gradients_;  // at entry(i, l)
+  PlayerExpressions values_;     // f_i at host numbers
+  PlayerExpressions gradients_;  // at own entries
   SparseRows pattern_;           // of both together
   std::vector<int> quadratic_place_;
   std::vector<int> expression_place_;

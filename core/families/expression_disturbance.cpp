@@ -4,7 +4,7 @@ namespace mixed_order_game {
 
 void ExpressionDisturbance::values(Real t, Real* d) const {
   SinusoidalDisturbance::values(t, d);
-  scratch_.assign(coefficients[amplitude].size(), 0.0);
+  scratch_.assign(at(own_entries()), 0.0);
   values_.values({.time = t, .parameters = coefficients.named.data()}, scratch_.data());
   for (std::size_t p = 0; p < scratch_.size(); ++p) d[p] += scratch_[p];
 }

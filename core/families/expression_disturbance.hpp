@@ -8,7 +8,7 @@ namespace mixed_order_game {
 
 class ExpressionDisturbance final : public SinusoidalDisturbance {
  public:
-  /// The values at entry(i, l), compiled.
+  /// The values at own entries, compiled.
   ExpressionDisturbance(SinusoidalDisturbance sinusoids, PlayerExpressions values)
       : SinusoidalDisturbance(std::move(sinusoids)), values_(std::move(values)) {}
 

@@ -4,8 +4,8 @@
 
 namespace mixed_order_game {
 
-ExpressionDynamics::ExpressionDynamics(PolynomialDynamics coefficients_of, const Shape& shape, PlayerExpressions values)
-    : PolynomialDynamics(std::move(coefficients_of)), players_(shape.players), values_(std::move(values)) {
+ExpressionDynamics::ExpressionDynamics(PolynomialDynamics coefficients_of, PlayerExpressions values)
+    : PolynomialDynamics(std::move(coefficients_of)), values_(std::move(values)) {
   unite(PolynomialDynamics::jacobian_pattern(), values_.pattern(LeafKind::action), pattern_, polynomial_place_,
         expression_place_);
 }
@@ -14,7 +14,7 @@ void ExpressionDynamics::values(const Real* x, const Real* v, Real* g) const {
   PolynomialDynamics::values(x, v, g);
   scratch_.assign(at(pattern_.rows()), 0.0);
   values_.values(leaves(x, v), scratch_.data());
-  for (int p = 0; p < pattern_.rows(); ++p) g[p] += coefficients[gain][at(p % players_)] * scratch_[at(p)];
+  for (int p = 0; p < pattern_.rows(); ++p) g[p] += coefficients[gain][at(shape().player_of_own(p))] * scratch_[at(p)];
 }
 
 template <typename Scalar>
@@ -22,7 +22,7 @@ void ExpressionDynamics::add_expressions(const CoefficientsAs<Scalar>& of, const
                                          Scalar* g) const {
   std::vector<Scalar> values(at(pattern_.rows()));
   values_.add_values({.points = x, .stride = 0, .velocities = v, .coefficients = &of}, values.data());
-  for (int p = 0; p < pattern_.rows(); ++p) g[p] += of.value(gain, p % players_) * values[at(p)];
+  for (int p = 0; p < pattern_.rows(); ++p) g[p] += of.value(gain, shape().player_of_own(p)) * values[at(p)];
 }
 
 void ExpressionDynamics::values(const CoefficientsAs<Dual>& along, const Dual* x, const Dual* v, Dual* g) const {
@@ -36,6 +36,13 @@ void ExpressionDynamics::values(const CoefficientsAs<Dependencies>& of, const De
   add_expressions(of, x, v, g);
 }
 
+std::vector<int> ExpressionDynamics::actions_used() const {
+  std::vector<int> used = PolynomialDynamics::actions_used();
+  const std::vector<int>& in_texts = values_.used(LeafKind::action);
+  used.insert(used.end(), in_texts.begin(), in_texts.end());
+  return used;
+}
+
 void ExpressionDynamics::jacobian(const Real* x, const Real* v, Real* values) const {
   std::fill_n(values, pattern_.entries(), 0.0);
   scratch_.resize(std::max(polynomial_place_.size(), expression_place_.size()));
@@ -45,7 +52,7 @@ void ExpressionDynamics::jacobian(const Real* x, const Real* v, Real* values) co
   values_.derivatives(LeafKind::action, leaves(x, v), scratch_.data());
   for (int p = 0; p < expressions.rows(); ++p) {
     for (int k = expressions.start[at(p)]; k < expressions.start[at(p + 1)]; ++k) {
-      values[expression_place_[at(k)]] += coefficients[gain][at(p % players_)] * scratch_[at(k)];
+      values[expression_place_[at(k)]] += coefficients[gain][at(shape().player_of_own(p))] * scratch_[at(k)];
     }
   }
 }
@@ -55,7 +62,7 @@ void ExpressionDynamics::velocity_jacobian(const Real* x, const Real* v, Real* v
   values_.derivatives(LeafKind::velocity, leaves(x, v), values);
   for (int p = 0; p < rows.rows(); ++p) {
     for (int k = rows.start[at(p)]; k < rows.start[at(p + 1)]; ++k) {
-      values[k] *= coefficients[gain][at(p % players_)];
+      values[k] *= coefficients[gain][at(shape().player_of_own(p))];
     }
   }
 }

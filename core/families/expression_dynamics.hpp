@@ -8,8 +8,8 @@ namespace mixed_order_game {
 
 class ExpressionDynamics final : public PolynomialDynamics {
  public:
-  /// The values at entry(i, l), compiled.
-  ExpressionDynamics(PolynomialDynamics polynomials, const Shape& shape, PlayerExpressions values);
+  /// The values at own entries, compiled.
+  ExpressionDynamics(PolynomialDynamics polynomials, PlayerExpressions values);
 
   [[nodiscard]] std::unique_ptr<UnknownDynamics> clone() const override {
     return std::make_unique<ExpressionDynamics>(*this);
@@ -22,6 +22,8 @@ class ExpressionDynamics final : public PolynomialDynamics {
   void jacobian(const Real* x, const Real* v, Real* values) const override;
   [[nodiscard]] const SparseRows& velocity_pattern() const override { return values_.pattern(LeafKind::velocity); }
   void velocity_jacobian(const Real* x, const Real* v, Real* values) const override;
+  [[nodiscard]] std::vector<int> actions_used() const override;
+  [[nodiscard]] std::vector<int> velocities_used() const override { return values_.used(LeafKind::velocity); }
 
  private:
   [[nodiscard]] LeafValues leaves(const Real* x, const Real* v) const {
@@ -30,7 +32,6 @@ class ExpressionDynamics final : public PolynomialDynamics {
   template <typename Scalar>
   void add_expressions(const CoefficientsAs<Scalar>& of, const Scalar* x, const Scalar* v, Scalar* g) const;
 
-  int players_;
   PlayerExpressions values_;
   SparseRows pattern_;  // of both together
   std::vector<int> polynomial_place_;

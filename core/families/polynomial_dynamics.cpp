@@ -18,9 +18,9 @@ constexpr Coefficient declared[] = {
 
 }  // namespace
 
-PolynomialDynamics::PolynomialDynamics(int players, int dimension)
-    : UnknownDynamics(Coefficients(declared, players, dimension)), players_(players) {
-  pattern_.start.assign(at(players * dimension + 1), 0);
+PolynomialDynamics::PolynomialDynamics(const Shape& shape)
+    : UnknownDynamics(Coefficients(declared, shape.players, shape.dimension)), shape_(shape) {
+  pattern_.start.assign(at(shape.own_entries() + 1), 0);
   no_velocities_ = pattern_;
 }
 
@@ -37,10 +37,11 @@ void PolynomialDynamics::refresh() {
   SparseRows pattern;
   linear_.clear();
   square_.clear();
-  auto term = terms.begin();
+  const int N = shape_.players;
   for (int row = 0; row < no_velocities_.rows(); ++row) {
-    for (; term != terms.end() && term->first / players_ == row; ++term) {
-      pattern.column.push_back(row / players_ * players_ + term->first % players_);
+    const int entry = shape_.entry_of_own(row);
+    for (auto term = terms.lower_bound(entry * N); term != terms.end() && term->first / N == entry; ++term) {
+      pattern.column.push_back(entry / N * N + term->first % N);
       linear_.push_back(term->second.first);
       square_.push_back(term->second.second);
     }
@@ -58,7 +59,7 @@ void PolynomialDynamics::values_as(const Scalar* x, Gain gain_of, Scalar* g) con
       const Scalar& xj = x[pattern_.column[at(k)]];
       sum += (linear_[at(k)] + square_[at(k)] * xj) * xj;  // G x_jl + H x_jl^2
     }
-    g[row] = gain_of(row % players_) * sum;
+    g[row] = gain_of(shape_.player_of_own(row)) * sum;
   }
 }
 
@@ -79,7 +80,7 @@ void PolynomialDynamics::jacobian(const Real* x, const Real* /*v*/, Real* values
   for (int row = 0; row < pattern_.rows(); ++row) {
     for (int k = pattern_.start[at(row)]; k < pattern_.start[at(row + 1)]; ++k) {
       const Real xj = x[pattern_.column[at(k)]];
-      values[k] = coefficients[gain][at(row % players_)] * (linear_[at(k)] + 2.0 * square_[at(k)] * xj);
+      values[k] = coefficients[gain][at(shape_.player_of_own(row))] * (linear_[at(k)] + 2.0 * square_[at(k)] * xj);
     }
   }
 }

@@ -9,7 +9,7 @@ class PolynomialDynamics : public UnknownDynamics {
  public:
   enum Number { linear, square, gain };  ///< G_ijl, H_ijl, gain_i
 
-  PolynomialDynamics(int players, int dimension);
+  explicit PolynomialDynamics(const Shape& shape);
 
   [[nodiscard]] std::unique_ptr<UnknownDynamics> clone() const override;
   void refresh() override;
@@ -21,12 +21,17 @@ class PolynomialDynamics : public UnknownDynamics {
   void jacobian(const Real* x, const Real* v, Real* values) const override;
   [[nodiscard]] const SparseRows& velocity_pattern() const override { return no_velocities_; }
   void velocity_jacobian(const Real* /*x*/, const Real* /*v*/, Real* /*values*/) const override {}
+  [[nodiscard]] std::vector<int> actions_used() const override { return pattern_.column; }
+  [[nodiscard]] std::vector<int> velocities_used() const override { return {}; }
+
+ protected:
+  [[nodiscard]] const Shape& shape() const { return shape_; }
 
  private:
   template <typename Scalar, typename Gain>
   void values_as(const Scalar* x, Gain gain_of, Scalar* g) const;
 
-  int players_;
+  Shape shape_;
   bool is_built_ = false;
   SparseRows pattern_;
   SparseRows no_velocities_;

@@ -42,19 +42,21 @@ Scalar own_gradient(int i, const Scalar& quadratic, const Scalar& linear, const 
 
 }  // namespace
 
-QuadraticCost::QuadraticCost(int players, int dimension)
-    : Cost(Coefficients(declared, players, dimension)), players_(players), dimension_(dimension) {
+QuadraticCost::QuadraticCost(const Shape& shape)
+    : Cost(Coefficients(declared, shape.players, shape.dimension)), shape_(shape) {
+  for (int h = 0; h < shape.hosts(); ++h) host_.push_back(shape.host(h));
   refresh();
 }
 
 std::unique_ptr<Cost> QuadraticCost::clone() const { return std::make_unique<QuadraticCost>(*this); }
 
 Real QuadraticCost::value(int i, const Real* x) const {
+  const int h = shape_.host_number(i);
   Real cost = coefficients[constant][at(i)];
-  for (int l = 0; l < dimension_; ++l) {
-    const Real* row = x + l * players_;
-    cost += coefficients[quadratic][at(i)] * row[i] * row[i] + coefficients[linear][at(l * players_ + i)] * row[i];
-    for (int k = neighbours_.start[at(i)]; k < neighbours_.start[at(i + 1)]; ++k) {
+  for (int l = 0; l < shape_.dimension; ++l) {
+    const Real* row = x + l * shape_.players;
+    cost += coefficients[quadratic][at(i)] * row[i] * row[i] + coefficients[linear][at(shape_.entry(i, l))] * row[i];
+    for (int k = neighbours_.start[at(h)]; k < neighbours_.start[at(h + 1)]; ++k) {
       const Real difference = row[i] - row[neighbours_.column[at(k)]];
       cost += neighbour_cost_[at(k)] * difference * difference;
     }
@@ -64,13 +66,14 @@ Real QuadraticCost::value(int i, const Real* x) const {
 
 void QuadraticCost::own_gradients(const Real* points, int stride, Real* gradient) const {
   const std::vector<Real>& q = coefficients[quadratic];
-  const std::vector<Real>& l_il = coefficients[linear];
-  for (int l = 0; l < dimension_; ++l) {
-    for (int i = 0; i < players_; ++i) {
-      const Real* row = points + i * stride + l * players_;
-      const int p = l * players_ + i;
-      gradient[p] = own_gradient(i, q[at(i)], l_il[at(p)], row, [&](auto visit) {
-        for (int k = neighbours_.start[at(i)]; k < neighbours_.start[at(i + 1)]; ++k) {
+  const int hosts = static_cast<int>(host_.size());
+  for (int l = 0; l < shape_.dimension; ++l) {
+    const Real* l_il = coefficients[linear].data() + l * shape_.players;
+    for (int h = 0; h < hosts; ++h) {
+      const Real* row = points + h * stride + l * shape_.players;
+      const int i = host_[at(h)];
+      gradient[l * hosts + h] = own_gradient(i, q[at(i)], l_il[i], row, [&](auto visit) {
+        for (int k = neighbours_.start[at(h)]; k < neighbours_.start[at(h + 1)]; ++k) {
           visit(neighbours_.column[at(k)], neighbour_cost_[at(k)]);
         }
       });
@@ -81,17 +84,19 @@ void QuadraticCost::own_gradients(const Real* points, int stride, Real* gradient
 template <typename Scalar>
 void QuadraticCost::own_gradients_as(const CoefficientsAs<Scalar>& coefficients_as, const Scalar* points, int stride,
                                      Scalar* gradient) const {
-  for (int l = 0; l < dimension_; ++l) {
-    for (int i = 0; i < players_; ++i) {
-      const Scalar* row = points + i * stride + l * players_;
-      const int p = l * players_ + i;
-      gradient[p] =
-          own_gradient(i, coefficients_as.value(quadratic, i), coefficients_as.value(linear, p), row, [&](auto visit) {
-            for (int j = 0; j < players_; ++j) {
-              const int slot = i * players_ + j;
-              if (!coefficients_as.vanishes(coupling, slot)) visit(j, coefficients_as.value(coupling, slot));
-            }
-          });
+  for (int l = 0; l < shape_.dimension; ++l) {
+    for (int h = 0; h < shape_.hosts(); ++h) {
+      const Scalar* row = points + h * stride + l * shape_.players;
+      const int i = shape_.host(h);
+      gradient[shape_.own_entry(h, l)] =
+          own_gradient(i, coefficients_as.value(quadratic, i), coefficients_as.value(linear, shape_.entry(i, l)), row,
+                       [&](auto visit) {
+                         for (int j = 0; j < shape_.players; ++j) {
+                           const int slot = i * shape_.players + j;
+                           if (!coefficients_as.vanishes(coupling, slot))
+                             visit(j, coefficients_as.value(coupling, slot));
+                         }
+                       });
     }
   }
 }
@@ -111,11 +116,13 @@ void QuadraticCost::hessian_rows(const Real* /*points*/, int /*stride*/, Real* v
 }
 
 void QuadraticCost::refresh() {
+  const int N = shape_.players;
   neighbours_ = {};
   neighbour_cost_.clear();
-  for (int i = 0; i < players_; ++i) {
-    for (int j = 0; j < players_; ++j) {
-      const Real c = coefficients[coupling][at(i) * at(players_) + at(j)];
+  for (int h = 0; h < shape_.hosts(); ++h) {
+    const int i = shape_.host(h);
+    for (int j = 0; j < N; ++j) {
+      const Real c = coefficients[coupling][at(i) * at(N) + at(j)];
       if (j != i && c != 0.0) {
         neighbours_.column.push_back(j);
         neighbour_cost_.push_back(c);
@@ -125,16 +132,17 @@ void QuadraticCost::refresh() {
   }
   pattern_ = {};
   hessian_.clear();
-  for (int l = 0; l < dimension_; ++l) {
-    for (int i = 0; i < players_; ++i) {
+  for (int l = 0; l < shape_.dimension; ++l) {
+    for (int h = 0; h < shape_.hosts(); ++h) {
+      const int i = shape_.host(h);
       // d^2 f_i / d x_il^2 = 2 q_i + sum_j 2 c_ij,  d^2 f_i / (d x_il d x_jl) = -2 c_ij
       Real own = 2.0 * coefficients[quadratic][at(i)];
       std::vector<std::pair<int, Real>> row;
-      for (int k = neighbours_.start[at(i)]; k < neighbours_.start[at(i + 1)]; ++k) {
+      for (int k = neighbours_.start[at(h)]; k < neighbours_.start[at(h + 1)]; ++k) {
         own += 2.0 * neighbour_cost_[at(k)];
-        row.emplace_back(l * players_ + neighbours_.column[at(k)], -2.0 * neighbour_cost_[at(k)]);
+        row.emplace_back(shape_.entry(neighbours_.column[at(k)], l), -2.0 * neighbour_cost_[at(k)]);
       }
-      row.emplace_back(l * players_ + i, own);
+      row.emplace_back(shape_.entry(i, l), own);
       std::sort(row.begin(), row.end());
       for (const auto& [column, value] : row) {
         pattern_.column.push_back(column);

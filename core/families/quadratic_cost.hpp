@@ -9,7 +9,7 @@ class QuadraticCost : public Cost {
  public:
   enum Number { quadratic, linear, constant, coupling };  ///< q_i, l_il, const_i, c_ij
 
-  QuadraticCost(int players, int dimension);
+  explicit QuadraticCost(const Shape& shape);
 
   [[nodiscard]] std::unique_ptr<Cost> clone() const override;
   void refresh() override;
@@ -22,14 +22,17 @@ class QuadraticCost : public Cost {
   void hessian_rows(const Real* points, int stride, Real* values) const override;
   [[nodiscard]] bool is_affine() const override { return true; }
 
+ protected:
+  [[nodiscard]] const Shape& shape() const { return shape_; }
+
  private:
   template <typename Scalar>
   void own_gradients_as(const CoefficientsAs<Scalar>& coefficients, const Scalar* points, int stride,
                         Scalar* gradient) const;
 
-  int players_;
-  int dimension_;
-  SparseRows neighbours_;             // row i: the j with c_ij != 0
+  Shape shape_;
+  std::vector<int> host_;             // player h of the hosted ones
+  SparseRows neighbours_;             // row h: the j with c_ij != 0 of i = host(h)
   std::vector<Real> neighbour_cost_;  // their c_ij
   SparseRows pattern_;
   std::vector<Real> hessian_;  // constant for this family

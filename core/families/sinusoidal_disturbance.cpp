@@ -36,8 +36,8 @@ constexpr Coefficient declared[] = {
 
 }  // namespace
 
-SinusoidalDisturbance::SinusoidalDisturbance(int players, int dimension)
-    : Disturbance(Coefficients(declared, players, dimension)) {
+SinusoidalDisturbance::SinusoidalDisturbance(const Shape& shape)
+    : Disturbance(Coefficients(declared, shape.players, shape.dimension)), shape_(shape) {
   refresh();
 }
 
@@ -46,31 +46,41 @@ std::unique_ptr<Disturbance> SinusoidalDisturbance::clone() const {
 }
 
 void SinusoidalDisturbance::refresh() {
-  phase_at_origin_ = coefficients[phase];
+  const auto own = [&](Number number) {
+    std::vector<Real> values;
+    for (int p = 0; p < own_entries(); ++p) values.push_back(coefficients[number][at(shape_.entry_of_own(p))]);
+    return values;
+  };
+  amplitude_ = own(amplitude);
+  frequency_ = own(frequency);
+  bias_ = own(bias);
+  phase_at_origin_ = own(phase);
   if (time_origin == 0.0) return;
   for (std::size_t p = 0; p < phase_at_origin_.size(); ++p) {
-    phase_at_origin_[p] = reduced_angle(coefficients[frequency][p], time_origin, coefficients[phase][p]);
+    phase_at_origin_[p] = reduced_angle(frequency_[p], time_origin, phase_at_origin_[p]);
   }
 }
 
 Dual SinusoidalDisturbance::phase_at_origin(const CoefficientsAs<Dual>& along, int p) const {
-  return {phase_at_origin_[at(p)], along.value(frequency, p).along * time_origin + along.value(phase, p).along};
+  const int entry = shape_.entry_of_own(p);
+  return {phase_at_origin_[at(p)], along.value(frequency, entry).along * time_origin + along.value(phase, entry).along};
 }
 
 Dependencies SinusoidalDisturbance::phase_at_origin(const CoefficientsAs<Dependencies>& of, int p) const {
-  return of.value(frequency, p) * time_origin + of.value(phase, p);
+  const int entry = shape_.entry_of_own(p);
+  return of.value(frequency, entry) * time_origin + of.value(phase, entry);
 }
 
 void SinusoidalDisturbance::values(Real t, Real* d) const {
-  const auto entries = static_cast<int>(coefficients[amplitude].size());
-  kernels().sinusoid(entries, t, coefficients[amplitude].data(), coefficients[frequency].data(),
-                     phase_at_origin_.data(), coefficients[bias].data(), d);
+  kernels().sinusoid(own_entries(), t, amplitude_.data(), frequency_.data(), phase_at_origin_.data(), bias_.data(), d);
 }
 
 template <typename Scalar>
 void SinusoidalDisturbance::values_as(const CoefficientsAs<Scalar>& of, const Scalar& t, Scalar* d) const {
-  for (int p = 0; p < static_cast<int>(coefficients[amplitude].size()); ++p) {
-    d[p] = of.value(bias, p) + of.value(amplitude, p) * sin(of.value(frequency, p) * t + phase_at_origin(of, p));
+  for (int p = 0; p < own_entries(); ++p) {
+    const int entry = shape_.entry_of_own(p);
+    d[p] = of.value(bias, entry) +
+           of.value(amplitude, entry) * sin(of.value(frequency, entry) * t + phase_at_origin(of, p));
   }
 }
 

@@ -9,7 +9,7 @@ class SinusoidalDisturbance : public Disturbance {
  public:
   enum Number { amplitude, frequency, phase, bias };  ///< all at entry(i, l); frequency in rad/s, phase in rad
 
-  SinusoidalDisturbance(int players, int dimension);
+  explicit SinusoidalDisturbance(const Shape& shape);
 
   [[nodiscard]] std::unique_ptr<Disturbance> clone() const override;
   void refresh() override;
@@ -17,12 +17,18 @@ class SinusoidalDisturbance : public Disturbance {
   void values(const CoefficientsAs<Dual>& along, const Dual& t, Dual* d) const override;
   void values(const CoefficientsAs<Dependencies>& of, const Dependencies& t, Dependencies* d) const override;
 
+ protected:
+  [[nodiscard]] int own_entries() const { return shape_.own_entries(); }
+
  private:
   template <typename Scalar>
   void values_as(const CoefficientsAs<Scalar>& of, const Scalar& t, Scalar* d) const;
   [[nodiscard]] Dual phase_at_origin(const CoefficientsAs<Dual>& along, int p) const;
   [[nodiscard]] Dependencies phase_at_origin(const CoefficientsAs<Dependencies>& of, int p) const;
 
+  Shape shape_;
+  // at own entries, as the coefficients
+  std::vector<Real> amplitude_, frequency_, bias_;
   std::vector<Real> phase_at_origin_;  ///< frequency time_origin + phase; a large origin does not cost it digits
 };
 

@@ -1,5 +1,5 @@
-// Unknown dynamics g_i(x, v) of the plants, as the closed loop sees them: values and Jacobian rows. Vectors have N D
-// entries; of v those of second-order players count.
+// Unknown dynamics g_i(x, v) of the hosted players' plants, as the closed loop sees them: values and Jacobian rows at
+// own entries. The vectors x and v have N D entries; of v those of second-order players count.
 #pragma once
 
 #include <memory>
@@ -16,13 +16,13 @@ class UnknownDynamics : public GameFamily {
   using GameFamily::GameFamily;
   [[nodiscard]] virtual std::unique_ptr<UnknownDynamics> clone() const = 0;
 
-  /// g[entry(i, l)] = g_il(x, v).
+  /// g[own entry] = g_il(x, v).
   virtual void values(const Real* x, const Real* v, Real* g) const = 0;
   virtual void values(const CoefficientsAs<Dual>& coefficients, const Dual* x, const Dual* v, Dual* g) const = 0;
   virtual void values(const CoefficientsAs<Dependencies>& coefficients, const Dependencies* x, const Dependencies* v,
                       Dependencies* g) const = 0;
 
-  /// Row entry(i, l): the columns entry(j, h) at which d g_il / d x_jh may differ from zero.
+  /// Row of an own entry: the columns entry(j, h) at which d g_il / d x_jh may differ from zero.
   [[nodiscard]] virtual const SparseRows& jacobian_pattern() const = 0;
 
   /// The entries of jacobian_pattern().
@@ -31,6 +31,10 @@ class UnknownDynamics : public GameFamily {
   /// The same along v.
   [[nodiscard]] virtual const SparseRows& velocity_pattern() const = 0;
   virtual void velocity_jacobian(const Real* x, const Real* v, Real* values) const = 0;
+
+  /// Entries of x and of v that are looked at, in any order, repeats allowed.
+  [[nodiscard]] virtual std::vector<int> actions_used() const = 0;
+  [[nodiscard]] virtual std::vector<int> velocities_used() const = 0;
 };
 
 }  // namespace mixed_order_game

@@ -32,9 +32,9 @@ void factor_directed_blocks(BlockPattern pattern, double* lower, double* upper, 
 template <typename Width, int count>
 inline void solve_directed_columns(const BlockPattern& pattern, Index length, const double* L, const double* U,
                                    const double* inverse, double* x) {
-  const int n = pattern.players;
+  const int n = pattern.blocks;
   Width sum[count];
-  for (int k = 0; k < n; ++k) {
+  for (int k = 0; k < pattern.players; ++k) {
     const double* from = x + pattern.order[k] * length;
     for (int h = 0; h < count; ++h) sum[h] = load_as<Width>(from + h * n);
     for (int a = pattern.start[k]; a < pattern.start[k + 1]; ++a) {
@@ -43,7 +43,7 @@ inline void solve_directed_columns(const BlockPattern& pattern, Index length, co
       for (int h = 0; h < count; ++h) store(load_as<Width>(to + h * n) - l * sum[h], to + h * n);
     }
   }
-  for (int k = n - 1; k >= 0; --k) {
+  for (int k = pattern.players - 1; k >= 0; --k) {
     double* to = x + pattern.order[k] * length;
     for (int h = 0; h < count; ++h) sum[h] = load_as<Width>(to + h * n);
     for (int a = pattern.start[k]; a < pattern.start[k + 1]; ++a) {
@@ -58,13 +58,14 @@ inline void solve_directed_columns(const BlockPattern& pattern, Index length, co
 
 void solve_directed_blocks(BlockPattern pattern, int width, const double* lower, const double* upper,
                            const double* inverse_diagonal, double* rhs) {
-  const Index n = pattern.players;
-  const Index entries = pattern.start[n];
+  const Index n = pattern.blocks;
+  const Index players = pattern.players;
+  const Index entries = pattern.start[players];
   for_columns(n, [=](auto lanes, Index j) {
     using Width = decltype(lanes);
     const Index tile = j / tile_length;
     const Index first = tile * entries * tile_length + j % tile_length;
-    const double* inverse = inverse_diagonal + tile * n * tile_length + j % tile_length;
+    const double* inverse = inverse_diagonal + tile * players * tile_length + j % tile_length;
     int h = 0;
     for (; h + 2 <= width; h += 2) {
       solve_directed_columns<Width, 2>(pattern, width * n, lower + first, upper + first, inverse, rhs + h * n + j);

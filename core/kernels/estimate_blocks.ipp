@@ -34,7 +34,7 @@ void factor_blocks(BlockPattern pattern, double* lower, double* diagonal) {
 template <typename Width, int count>
 inline void solve_columns(const BlockPattern& pattern, Index length, const double* L, const double* inverse,
                           double* x) {
-  const int n = pattern.players;
+  const int n = pattern.blocks;
   Width sum[count];
   for (int k = 0; k < pattern.listed; ++k) {
     const double* from = x + pattern.order[k] * length;
@@ -60,24 +60,25 @@ inline void solve_columns(const BlockPattern& pattern, Index length, const doubl
 }
 
 void solve_blocks(BlockPattern pattern, int width, const double* lower, const double* inverse_diagonal, double* rhs) {
-  const Index n = pattern.players;
+  const Index n = pattern.blocks;
+  const Index players = pattern.players;
   const Index full = full_players(pattern);
   const Index entries = pattern.start[pattern.listed] + full * (full - 1) / 2;
   for_columns(n, [=](auto lanes, Index j) {
     using Width = decltype(lanes);
     const Index tile = j / tile_length;
     const double* L = lower + tile * entries * tile_length + j % tile_length;
-    const double* inverse = inverse_diagonal + tile * n * tile_length + j % tile_length;
+    const double* inverse = inverse_diagonal + tile * players * tile_length + j % tile_length;
     int h = 0;
     for (; h + 2 <= width; h += 2) solve_columns<Width, 2>(pattern, width * n, L, inverse, rhs + h * n + j);
     if (h < width) solve_columns<Width, 1>(pattern, width * n, L, inverse, rhs + h * n + j);
   });
 }
 
-void add_shared_signal(int players, int dimension, const double* gain, const double* shared, double* y) {
+void add_shared_signal(int rows, int players, int dimension, const double* gain, const double* shared, double* y) {
   with_width(players, [=](auto width) {
     using Width = decltype(width);
-    for (int i = 0; i < players; ++i) {
+    for (int i = 0; i < rows; ++i) {
       const double* row = gain + static_cast<Index>(i) * players;
       for (int l = 0; l < dimension; ++l) {
         const double* from = shared + l * players;

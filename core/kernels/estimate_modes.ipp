@@ -5,10 +5,11 @@ void factor_modes(BlockModes modes, double gamma_k3, double* inverse, double* ga
   const Index n = modes.n;
   set_row(N * n, inverse,
           [=](auto width, Index k) { return 1.0 / (1.0 + gamma_k3 * load_as<decltype(width)>(modes.eigenvalue + k)); });
-  with_width(N, [=](auto width) {
+  const int blocks = modes.blocks;
+  with_width(blocks, [=](auto width) {
     using Width = decltype(width);
     for (int i = 0; i < N; ++i) {
-      set_row_by(width, N, gain + i * N, [=](auto, Index j) {
+      set_row_by(width, blocks, gain + i * blocks, [=](auto, Index j) {
         Width sum = {};
         for (int k = 0; k < N; ++k) {
           const Width share = load_as<Width>(modes.shared + k * n + j) * load_as<Width>(inverse + k * n + j);

@@ -108,7 +108,7 @@ inline void factor_full(Index n, double* entries, double* D) {
 /// x in `count` coordinates of as many blocks as Width holds, beginning at player 0; see solve_columns.
 template <typename Width, int count>
 inline void solve_full(const BlockPattern& pattern, Index length, const double* L, const double* inverse, double* x) {
-  const int N = pattern.players;
+  const int N = pattern.blocks;
   const int n = full_players(pattern);
   const int* order = pattern.order + pattern.listed;
   const double* entries = full_entries(pattern, L);

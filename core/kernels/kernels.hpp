@@ -10,7 +10,7 @@
 
 namespace mixed_order_game {
 
-/// Neighbours of each player with their edge weights a_ik, as compressed rows.
+/// Neighbours of each row's player with their edge weights a_ik, as compressed rows.
 struct NeighbourRows {
   const int* start;
   const int* neighbour;
@@ -20,7 +20,8 @@ struct NeighbourRows {
 /// Pattern of the factors of all estimate blocks; see BlockElimination. The blocks' numbers lie in tiles of eight
 /// blocks: entry a (or diagonal entry k) of block j at (j / 8 * entries + a) * 8 + j % 8.
 struct BlockPattern {
-  int players;
+  int players;        ///< in each block: the hosted ones
+  int blocks;         ///< one for each player
   int listed;         ///< columns of L before the full ones, whose number is a multiple of full_step
   const int* start;   ///< column k < listed: entries start[k] .. start[k + 1] - 1; then those of the full columns
   const int* row;     ///< their rows, in elimination order
@@ -33,7 +34,8 @@ constexpr int full_step = 4;
 
 /// All estimate blocks by their eigenvectors; see EstimateBlocks. Entries lie in rows of n = N D.
 struct BlockModes {
-  int players;
+  int players;  ///< in each block: the hosted ones
+  int blocks;   ///< one for each player
   int n;
   const double* vector;      ///< row k * N + i: entry i of the k-th eigenvector of each block
   const double* eigenvalue;  ///< row k
@@ -53,18 +55,19 @@ struct Kernels {
   void (*sinusoid)(int n, double t, const double* amplitude, const double* frequency, const double* phase,
                    const double* bias, double* d);
 
-  // closed loop; n = N D entries in a row
-  /// S_m(y_i) for centres c_m (1, ..., 1) at m * N + i: activation[m * n + entry(i, l)], equal for every l; sharpness
-  /// is 1 / rho_i^2. exponent is scratch of N (q + 2) + 8 numbers.
-  void (*activations_diagonal)(int players, int dimension, int neurons, const double* centers, const double* sharpness,
+  // closed loop; n = N D entries in a row of estimates, one row for each of the H hosted players
+  /// S_m(y_i) for centres c_m (1, ..., 1) at m * H + h: activation[m * H D + own entry], equal for every coordinate;
+  /// sharpness is 1 / rho_i^2. exponent is scratch of H (q + 2) + 8 numbers.
+  void (*activations_diagonal)(int rows, int n, int dimension, int neurons, const double* centers, const double* sharpness,
                                const double* y, double* exponent, double* activation);
-  /// The same for centres that are vectors, `owners` of each m: centre m of player i is the row m * owners + i of N D
+  /// The same for centres that are vectors, `owners` of each m: centre m of row h is the row m * owners + h of n
   /// numbers, or row m of all players when there is one.
-  void (*activations_general)(int players, int dimension, int neurons, int owners, const double* centers,
+  void (*activations_general)(int rows, int n, int dimension, int neurons, int owners, const double* centers,
                               const double* sharpness, const double* y, double* exponent, double* activation);
-  /// y_ij' = -k3_i (sum_k a_ik (y_ij - y_kj) + a_ij (y_ij - xbar_j))
-  void (*estimate_rates)(int players, int dimension, NeighbourRows graph, const double* k3, const double* y,
-                         const double* xbar, double* rate);
+  /// y_ij' = -k3_i (sum_k a_ik (y_ij - y_kj) + a_ij (y_ij - xbar_j)), with the k of the graph among the rows and the j
+  /// that are seen among all players.
+  void (*estimate_rates)(int rows, int players, int dimension, NeighbourRows graph, NeighbourRows seen, const double* k3,
+                         const double* y, const double* xbar, double* rate);
   /// sum[p] = sum over m of a[m * n + p] * b[m * n + p]
   void (*column_products)(int n, int rows, const double* a, const double* b, double* sum);
   /// W' = beta e (S - radial W), row by row; radial[p] is 0 inside and w'S / W_max on the sphere.
@@ -85,12 +88,12 @@ struct Kernels {
   void (*factor_directed_blocks)(BlockPattern pattern, double* lower, double* upper, double* diagonal);
   void (*solve_directed_blocks)(BlockPattern pattern, int width, const double* lower, const double* upper,
                                 const double* inverse_diagonal, double* rhs);
-  /// inverse (N rows of n) = 1 / (1 + gamma k3 eigenvalue); gain[i * N + j] as in EstimateBlocks.
+  /// inverse (H rows of n) = 1 / (1 + gamma k3 eigenvalue); gain[i * N + j] as in EstimateBlocks.
   void (*factor_modes)(BlockModes modes, double gamma_k3, double* inverse, double* gain);
-  /// Solves all blocks, in place: N rows of n.
+  /// Solves all blocks, in place: H rows of n.
   void (*solve_modes)(BlockModes modes, const double* inverse, double* rhs);
   /// dy_ij = dy_ij + gain_ij dxbar_j
-  void (*add_shared_signal)(int players, int dimension, const double* gain, const double* shared, double* y);
+  void (*add_shared_signal)(int rows, int players, int dimension, const double* gain, const double* shared, double* y);
   /// rhs = scale rhs + from_error S + onto_weight W, row by row; coefficients per column.
   void (*weight_corrections)(int n, int neurons, const double* scale, const double* from_error,
                              const double* onto_weight, const double* activation, const double* weights, double* rhs);

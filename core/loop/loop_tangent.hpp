@@ -15,28 +15,31 @@ class LoopTangent {
 
   // the direction; all zero after clear()
   AlignedVector state;
-  AlignedVector d_ext;  ///< at entry(i, l)
+  AlignedVector inputs;  ///< as ClosedLoop::inputs says
   Real time = 0.0;
 
   // what follows along it
-  AlignedVector control;  ///< of u, at entry(i, l)
+  AlignedVector control;  ///< of u, at own entries
   AlignedVector rate;     ///< of the state's rate
+  AlignedVector actions;  ///< of x, at entry(i, l)
+  AlignedVector shared;   ///< of xbar, likewise
 
   void clear();
 
-  /// Sets control and rate at time t [s] and a state.
-  void follow(Real t, const Real* at_state, const Modes& modes);
+  /// Sets control, rate and actions at time t [s], a state and inputs.
+  void follow(Real t, const Real* at_state, const Real* at_inputs, const Modes& modes);
 
   /// The same at the start of a run along parameters, too; sets state to the change of the initial state.
-  void follow_parameters(const Parameters& direction, Real t, const Real* at_state, const Modes& modes);
+  void follow_parameters(const Parameters& direction, Real t, const Real* at_state, const Real* at_inputs,
+                         const Modes& modes);
 
  private:
-  void evaluate(const Parameters* direction, Real t, const Real* at_state, const Modes& modes);
+  void evaluate(const Parameters* direction, Real t, const Real* at_state, const Real* at_inputs, const Modes& modes);
 
   const ClosedLoop* loop_;
   LoopEquations<Dual> equations_;
   LoopNumbers<Dual> numbers_;
-  std::vector<Dual> state_, d_ext_, rate_;
+  std::vector<Dual> state_, inputs_, rate_;
 };
 
 }  // namespace mixed_order_game

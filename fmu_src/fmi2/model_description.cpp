@@ -53,7 +53,7 @@ void write_head(xml_node root, const Model& model) {
   attribute(root, "license", "BSD-3-Clause, see documentation/licenses");
   attribute(root, "generationTool", tool);
   attribute(root, "variableNamingConvention", "structured");
-  const int columns = model.offers_model_exchange() ? model.game.parameters.shape.actions() : 0;
+  const int columns = model.offers_model_exchange() ? model.game.parameters.shape.own_entries() : 0;
   attribute(root, "numberOfEventIndicators", std::to_string(columns));
 
   if (model.offers_model_exchange()) {
@@ -128,10 +128,10 @@ std::string start_of(Type type, Real start) {
 void write_variables(xml_node root, const Model& model) {
   const ModelVariables& variables = model.variables;
   const Settings settings(model.game);
-  const AlignedVector no_input(at(model.game.parameters.shape.actions()));
+  const AlignedVector no_inputs(at(settings.inputs.count()));
   View view;
   view.settings = &settings;
-  view.d_ext = no_input.data();
+  view.inputs = no_inputs.data();
   xml_node model_variables = root.append_child("ModelVariables");
   for (int reference = 0; reference < variables.size(); ++reference) {
     const Family& family = variables.family(reference);

@@ -19,7 +19,7 @@ bool same_bits(std::span<const Real> a, std::span<const Real> b) {
 }  // namespace
 
 CoSimulation::CoSimulation(const Evaluation& evaluation)
-    : loop_(evaluation.loop()), integrator_(loop_, evaluation.input(), make_structured_newton()) {}
+    : loop_(evaluation.loop()), integrator_(loop_, evaluation.inputs(), make_structured_newton()) {}
 
 void CoSimulation::start(Tolerances tolerances, std::vector<Real> acting) {
   integrator_.start(0.0, tolerances);

@@ -18,16 +18,16 @@ Tangent DirectionalDerivative::along(const Changes& changes, Equations equations
     const auto reference = static_cast<int>(changes.references[k]);
     const Family& family = variables.family(reference);
     const int slot = variables.variable(reference).slot;
-    if (family.state >= 0) tangent_.state[at(family.state + slot)] += changes.values[k];
-    if (family.causality == Causality::input) tangent_.d_ext[at(slot)] += changes.values[k];
+    if (family.is_state) tangent_.state[at(slot)] += changes.values[k];
+    if (family.causality == Causality::input) tangent_.inputs[at(slot)] += changes.values[k];
     if (family.causality == Causality::independent) tangent_.time += changes.values[k];
   }
   if (equations == Equations::running) {
-    tangent_.follow(standing.since_origin, standing.state, *standing.modes);
+    tangent_.follow(standing.since_origin, standing.state, view.acting_inputs, *standing.modes);
     return tangent();
   }
   const Parameters direction = parameters_along(changes);
-  tangent_.follow_parameters(direction, standing.since_origin, standing.state, *standing.modes);
+  tangent_.follow_parameters(direction, standing.since_origin, standing.state, view.acting_inputs, *standing.modes);
   if (view.x_star != nullptr) {
     x_star_ = nash_equilibrium_along(*loop_->parameters().cost, *direction.cost, loop_->shape(), view.x_star);
   }
@@ -51,10 +51,11 @@ Parameters DirectionalDerivative::parameters_along(const Changes& changes) const
   return direction.parameters;
 }
 
-Tangent DirectionalDerivative::along_run(const View& view, const Standing& standing) {
+Tangent DirectionalDerivative::along_run(const View& view, const Standing& standing, const Inputs& inputs) {
   tangent_.clear();
   std::copy_n(view.rate, tangent_.state.size(), tangent_.state.begin());
-  tangent_.follow(standing.since_origin, standing.state, *standing.modes);
+  inputs.rates(standing.since_origin, tangent_.inputs.data());
+  tangent_.follow(standing.since_origin, standing.state, view.acting_inputs, *standing.modes);
   std::fill(x_star_.begin(), x_star_.end(), 0.0);
   return tangent();
 }
@@ -62,7 +63,10 @@ Tangent DirectionalDerivative::along_run(const View& view, const Standing& stand
 Tangent DirectionalDerivative::tangent() const {
   return {.state = tangent_.state.data(),
           .rate = tangent_.rate.data(),
+          .inputs = tangent_.inputs.data(),
           .control = tangent_.control.data(),
+          .actions = tangent_.actions.data(),
+          .shared = tangent_.shared.data(),
           .x_star = x_star_.data()};
 }
 

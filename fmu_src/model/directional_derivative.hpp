@@ -23,8 +23,8 @@ class DirectionalDerivative {
 
   /// Along changes of known variables, where the run stands. Tangents are valid until the next call.
   Tangent along(const Changes& changes, Equations equations, const View& view, const Standing& standing);
-  /// Along the run itself: per unit of time, with all inputs at rest.
-  Tangent along_run(const View& view, const Standing& standing);
+  /// Along the run itself: per unit of time, with the inputs that act.
+  Tangent along_run(const View& view, const Standing& standing, const Inputs& inputs);
 
  private:
   [[nodiscard]] Parameters parameters_along(const Changes& changes) const;

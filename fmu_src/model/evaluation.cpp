@@ -8,17 +8,22 @@ namespace mixed_order_game {
 
 Evaluation::Evaluation(const Game& game)
     : loop_(game.parameters),
-      input_(game.parameters.shape.actions()),
+      inputs_(loop_.inputs().size()),
       signals_(loop_.shape()),
       rate_(at(loop_.layout().size())),
-      d_ext_(at(loop_.shape().actions())),
-      d_ext_as_set_(at(loop_.shape().actions())) {}
+      input_values_(at(loop_.inputs().size())),
+      input_values_as_set_(input_values_.size()) {}
+
+const Real* Evaluation::inputs_at(const Standing& standing) {
+  inputs_.values(standing.since_origin, input_values_.data());
+  return input_values_.data();
+}
 
 void Evaluation::act(const Settings& settings) {
   loop_.parameters() = settings.parameters;
   loop_.refresh();
   moved();
-  act(settings.input);
+  act(settings.inputs);
 }
 
 void Evaluation::set_time_origin(Real time_origin) {
@@ -28,9 +33,9 @@ void Evaluation::set_time_origin(Real time_origin) {
 }
 
 // Importers set their inputs at every evaluation, changed or not.
-void Evaluation::act(const ExternalDisturbance& input) {
-  if (std::memcmp(input.numbers().data(), input_.numbers().data(), input.numbers().size_bytes()) == 0) return;
-  input_ = input;
+void Evaluation::act(const Inputs& inputs) {
+  if (std::memcmp(inputs.numbers().data(), inputs_.numbers().data(), inputs.numbers().size_bytes()) == 0) return;
+  inputs_ = inputs;
   moved();
 }
 
@@ -40,8 +45,8 @@ void Evaluation::prepare(Stage stage, Settings& settings, const Standing& standi
     case Stage::state:
     case Stage::statistics:
       break;
-    case Stage::input:
-      settings.input.values(standing.since_origin, d_ext_as_set_.data());
+    case Stage::inputs:
+      settings.inputs.values(standing.since_origin, input_values_as_set_.data());
       break;
     case Stage::signals:
       prepare_signals(standing);
@@ -54,14 +59,13 @@ void Evaluation::prepare(Stage stage, Settings& settings, const Standing& standi
 
 void Evaluation::prepare_signals(const Standing& standing) {
   if (signals_valid_) return;
-  input_.values(standing.since_origin, d_ext_.data());
-  loop_.evaluate(standing.since_origin, standing.state, d_ext_.data(), *standing.modes, signals_, rate_.data());
+  loop_.evaluate(standing.since_origin, standing.state, inputs_at(standing), *standing.modes, signals_, rate_.data());
   signals_valid_ = true;
 }
 
 // Of the signals it writes those of seeking only, which prepare_signals finds for the same state.
 void Evaluation::event_indicators(const Standing& standing, Real tolerance, Real* values) {
-  loop_.event_functions(standing.state, *standing.modes, tolerance, signals_, values);
+  loop_.event_functions(standing.state, inputs_at(standing), *standing.modes, tolerance, signals_, values);
 }
 
 void Evaluation::prepare_equilibrium(Settings& settings) {
@@ -71,13 +75,15 @@ void Evaluation::prepare_equilibrium(Settings& settings) {
   equilibrium_valid_ = true;
 }
 
-View Evaluation::view(const Settings& settings, const Standing& standing) const {
+View Evaluation::view(const Settings& settings, const Standing& standing) {
   View view;
   view.settings = &settings;
   view.loop = &loop_;
   view.time = standing.time;
-  view.d_ext = d_ext_as_set_.data();
+  view.inputs = input_values_as_set_.data();
   view.state = standing.state;
+  view.acting_inputs = inputs_at(standing);
+  view.plants = loop_.plants(standing.state, view.acting_inputs, signals_);
   view.rate = rate_.data();
   view.signals = &signals_;
   view.x_star = equilibrium_valid_ ? x_star_.data() : nullptr;

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "closed_loop.hpp"
-#include "external_disturbance.hpp"
+#include "loop/inputs.hpp"
 #include "settings.hpp"
 
 namespace mixed_order_game {
@@ -22,11 +22,13 @@ class Evaluation {
   Evaluation& operator=(const Evaluation&) = delete;
 
   [[nodiscard]] const ClosedLoop& loop() const { return loop_; }
-  [[nodiscard]] const ExternalDisturbance& input() const { return input_; }
+  [[nodiscard]] const Inputs& inputs() const { return inputs_; }
+  /// The values of those that act, where the run stands.
+  const Real* inputs_at(const Standing& standing);
 
-  /// These settings, or this input, act from here on.
+  /// These settings, or these inputs, act from here on.
   void act(const Settings& settings);
-  void act(const ExternalDisturbance& input);
+  void act(const Inputs& inputs);
   /// The loop counts time from here on, s.
   void set_time_origin(Real time_origin);
   /// The run stands somewhere else, or goes on from another run.
@@ -45,18 +47,18 @@ class Evaluation {
   /// Signals and rates that prepare_signals found.
   [[nodiscard]] const Signals& signals() const { return signals_; }
   [[nodiscard]] const AlignedVector& rate() const { return rate_; }
-  [[nodiscard]] View view(const Settings& settings, const Standing& standing) const;
+  [[nodiscard]] View view(const Settings& settings, const Standing& standing);
 
  private:
   ClosedLoop loop_;
-  ExternalDisturbance input_;
+  Inputs inputs_;
 
   bool signals_valid_ = false;
   bool equilibrium_valid_ = false;
   Signals signals_;
   AlignedVector rate_;
-  AlignedVector d_ext_;  // that acts
-  AlignedVector d_ext_as_set_;
+  AlignedVector input_values_;  // that act
+  AlignedVector input_values_as_set_;
   std::vector<Real> x_star_;
 };
 

@@ -52,7 +52,7 @@ Instance::Instance(Model model, Interface interface)
       evaluation_(model_.game),
       directional_derivative_(model_, evaluation_.loop()),
       initial_state_(at(evaluation_.loop().layout().size())),
-      initial_modes_(at(evaluation_.loop().shape().actions())) {}
+      initial_modes_(at(evaluation_.loop().shape().own_entries())) {}
 
 Standing Instance::standing() const {
   if (co_simulation_) return co_simulation_->standing();
@@ -194,7 +194,7 @@ void Instance::set(Type type, std::span<const std::uint32_t> references, const R
       throw Error(variables.name(reference) + " was set to " + text_of(values[k]) + ", expected " +
                   family.range.expectation());
     }
-    if (family.state >= 0) {
+    if (family.is_state) {
       state_set = true;
       continue;
     }
@@ -228,9 +228,9 @@ void Instance::set_input_derivatives(std::span<const std::uint32_t> references, 
     if (variables.family(reference).causality != Causality::input) {
       throw Error(name + " is not an input, and only inputs have derivatives that can be set");
     }
-    if (orders[k] < 1 || orders[k] > ExternalDisturbance::highest_derivative) {
+    if (orders[k] < 1 || orders[k] > Inputs::highest_derivative) {
       throw Error("derivative " + std::to_string(orders[k]) + " of " + name + " was set, expected an order from 1 to " +
-                  std::to_string(ExternalDisturbance::highest_derivative));
+                  std::to_string(Inputs::highest_derivative));
     }
     if (!std::isfinite(values[k])) {
       throw Error("derivative " + std::to_string(orders[k]) + " of " + name + " was set to " + text_of(values[k]) +
@@ -246,25 +246,22 @@ void Instance::set_input_derivatives(std::span<const std::uint32_t> references, 
 // The polynomial set before goes on from here with one derivative changed. An input without derivatives is stored
 // without a time, so that setting zeros again and again does not look like a change.
 void Instance::set_input_derivative(int slot, int order, Real value) {
-  constexpr int highest = ExternalDisturbance::highest_derivative;
+  constexpr int highest = Inputs::highest_derivative;
   static_assert(highest == 3);
-  ExternalDisturbance& input = settings_.input;
+  Inputs& inputs = settings_.inputs;
   const Real t = standing().since_origin;
-  const auto polynomial = [&] { return input.numbers().subspan(at(slot) * (highest + 2), highest + 2); };
-  const auto is_constant = [&] {
-    return std::all_of(polynomial().begin() + 1, polynomial().begin() + highest + 1, [](Real c) { return c == 0.0; });
-  };
-  if (!is_constant() && polynomial()[highest + 1] != t) {
+  const auto polynomial = [&] { return inputs.numbers().subspan(at(slot) * (highest + 2), highest + 2); };
+  if (!inputs.is_constant(slot) && polynomial()[highest + 1] != t) {
     const auto c = polynomial();
     const Real h = t - c[highest + 1];
     const Real shifted[] = {c[0] + h * (c[1] + h / 2.0 * (c[2] + h / 3.0 * c[3])), c[1] + h * (c[2] + h / 2.0 * c[3]),
                             c[2] + h * c[3], c[3]};
-    input.set_value(slot, shifted[0]);
-    for (int k = 1; k <= highest; ++k) input.set_derivative(slot, k, shifted[k], t);
+    inputs.set_value(slot, shifted[0]);
+    for (int k = 1; k <= highest; ++k) inputs.set_derivative(slot, k, shifted[k], t);
   }
-  if (value == 0.0 && is_constant()) return;
-  input.set_derivative(slot, order, value, t);
-  if (is_constant()) input.set_value(slot, input.value(slot));
+  if (value == 0.0 && inputs.is_constant(slot)) return;
+  inputs.set_derivative(slot, order, value, t);
+  if (inputs.is_constant(slot)) inputs.set_value(slot, inputs.value(slot));
 }
 
 void Instance::get_output_derivatives(std::span<const std::uint32_t> references, const int* orders, Real* values) {
@@ -281,7 +278,7 @@ void Instance::get_output_derivatives(std::span<const std::uint32_t> references,
     }
   }
   const View source = prepare_tangent(references);
-  const Tangent tangent = directional_derivative_.along_run(source, standing());
+  const Tangent tangent = directional_derivative_.along_run(source, standing(), evaluation_.inputs());
   read_along(references, source, tangent, values);
 }
 
@@ -334,7 +331,7 @@ void Instance::act() {
   if (touched_ == Change::parameters) {
     evaluation_.act(settings_);
   } else {
-    evaluation_.act(settings_.input);
+    evaluation_.act(settings_.inputs);
   }
   if (!model_exchange_) evaluation_.loop().initial_state(initial_state_.data());
   touched_ = Change::none;
@@ -344,7 +341,7 @@ Standing Instance::prepare(const Stages& needed) {
   const auto is_needed = [&](Stage stage) { return needed[static_cast<std::size_t>(stage)]; };
   if (is_needed(Stage::state) || is_needed(Stage::signals) || is_needed(Stage::equilibrium)) act();
   const Standing now = standing();
-  for (const Stage stage : {Stage::input, Stage::signals, Stage::equilibrium}) {
+  for (const Stage stage : {Stage::inputs, Stage::signals, Stage::equilibrium}) {
     if (is_needed(stage)) evaluation_.prepare(stage, settings_, now);
   }
   return now;
@@ -361,7 +358,8 @@ Tolerances Instance::tolerances() const {
 /// What involves several values, so that it can be judged only once all are set.
 void Instance::check_settings() {
   const CommunicationGraph& graph = settings_.parameters.graph;
-  const auto apart = graph.not_reached();
+  const bool hosts_all = settings_.parameters.shape.hosts_all();
+  const auto apart = hosts_all ? graph.not_reached() : std::nullopt;
   if (!settings_.allow_disconnected && apart && graph.directed()) {
     throw Error("by the weights a[i,j] nothing of player " + std::to_string(apart->first + 1) + " reaches player " +
                 std::to_string(apart->second + 1) +
@@ -373,7 +371,7 @@ void Instance::check_settings() {
   }
   require_moderate_factors(graph);
   require_bounded_weights(settings_.parameters);
-  evaluation_.prepare_equilibrium(settings_);
+  if (hosts_all) evaluation_.prepare_equilibrium(settings_);
 }
 
 void Instance::do_step(Real t, Real h) {
@@ -389,7 +387,7 @@ void Instance::do_step(Real t, Real h) {
   evaluation_.moved();
   try {
     if (change == Change::parameters) evaluation_.act(settings_);
-    if (change == Change::input) evaluation_.act(settings_.input);
+    if (change == Change::input) evaluation_.act(settings_.inputs);
     if (change != Change::none) co_simulation_->settings_act(change, std::move(numbers));
     co_simulation_->advance(end);
   } catch (const std::exception& error) {

@@ -33,7 +33,7 @@ static_assert(std::size(phase_names) == phases);
 
 /// The phases in which a variable of this family may be set.
 PhaseSet settable(const Family& family) {
-  if (family.state >= 0) return states_settable;
+  if (family.is_state) return states_settable;
   for (const VariableRule& rule : variable_rules) {
     if (rule.causality == family.causality && rule.variability == family.variability) {
       return rule.standard | rule.beyond;
@@ -66,7 +66,7 @@ bool may_be_set(const Family& family, Phase phase) { return (settable(family) & 
 
 std::string why_not_settable(const Family& family, Phase phase, Interface interface) {
   const bool some_time = (settable(family) & of(interface)) != 0;
-  const std::string_view kind = some_time && family.state >= 0 ? "a state" : kind_of(family);
+  const std::string_view kind = some_time && family.is_state ? "a state" : kind_of(family);
   std::string text = "is " + std::string(kind);
   if (some_time) {
     text += ", which cannot be set in the state " + std::string(name_of(phase));

@@ -40,9 +40,10 @@ bool ModelExchange::update_modes(Real tolerance) {
   const ClosedLoop& loop = evaluation_.loop();
   Signals signals(loop.shape());
   Modes modes = point_.modes;
-  point_.events += loop.resolve_modes(point_.state.data(), tolerance, signals, modes);
+  const Real* inputs = evaluation_.inputs_at(standing());
+  point_.events += loop.resolve_modes(point_.state.data(), inputs, tolerance, signals, modes);
   AlignedVector state = point_.state;
-  loop.project(modes, signals, state.data());
+  loop.project(modes, inputs, signals, state.data());
   const bool moved = state != point_.state;
   if (moved || modes != point_.modes) evaluation_.moved();
   point_.state = std::move(state);

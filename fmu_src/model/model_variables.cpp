@@ -40,18 +40,7 @@ template <auto Member>
 void write_initial(Settings& settings, int slot, Real value) {
   (settings.parameters.initial.*Member)[at(slot)] = value;
 }
-template <auto Offset>
-Real read_rate(const View& view, int slot) {
-  return view.rate[(view.loop->layout().*Offset)() + slot];
-}
-template <auto Offset>
-Real read_state_along(const View& view, const Tangent& tangent, int slot) {
-  return tangent.state[(view.loop->layout().*Offset)() + slot];
-}
-template <auto Offset>
-Real read_rate_along(const View& view, const Tangent& tangent, int slot) {
-  return tangent.rate[(view.loop->layout().*Offset)() + slot];
-}
+Real read_state_along(const View&, const Tangent& tangent, int slot) { return tangent.state[slot]; }
 template <auto Member>
 Real read_count(const View& view, int) {
   return static_cast<Real>(std::min<std::int64_t>(view.statistics.*Member, std::numeric_limits<std::int32_t>::max()));
@@ -85,7 +74,7 @@ std::string Range::expectation() const {
 class ModelVariables::Builder {
  public:
   Builder(ModelVariables& table, const Game& game)
-      : table_(table), game_(game), shape_(game.parameters.shape), layout_(shape_), n_(shape_.actions()) {}
+      : table_(table), game_(game), shape_(game.parameters.shape), layout_(shape_), inputs_(game.parameters) {}
 
   void add_all() {
     add({.name = "time",
@@ -105,7 +94,7 @@ class ModelVariables::Builder {
     add_switches();
     add_initial_state();
     add_tolerances();
-    add_input();
+    add_inputs();
     add_outputs();
     add_inside_of_the_loop();
     add_solver();
@@ -115,43 +104,91 @@ class ModelVariables::Builder {
  private:
   static Elements one() { return {{0, {}}}; }
 
-  // [i] for players of an order; 0: for all
-  Elements players(int order = 0) const {
+  /// [i] of the hosted players of an order (0: of all), or of those whose plants are in the loop.
+  Elements players(int order = 0, bool with_plants = false) const {
     Elements elements;
-    for (int i = 0; i < shape_.players; ++i) {
-      if (order == 0 || shape_.order[at(i)] == order) elements.push_back({i, {i + 1}});
-    }
-    return elements;
-  }
-  // [i,l] for players of an order; 0: for all
-  Elements actions(int order = 0) const {
-    Elements elements;
-    for (int i = 0; i < shape_.players; ++i) {
+    for (int h = 0; h < shape_.hosts(); ++h) {
+      const int i = shape_.host(h);
       if (order != 0 && shape_.order[at(i)] != order) continue;
-      for (int l = 0; l < shape_.dimension; ++l) elements.push_back({shape_.entry(i, l), {i + 1, l + 1}});
+      if (!with_plants || shape_.has_plant(i)) elements.push_back({i, {i + 1}});
     }
     return elements;
   }
-  Elements estimates() const {
+  /// [i,l] of the hosted players for which place(i, own entry) is a slot, not -1.
+  template <typename Place>
+  Elements actions_at(Place place) const {
     Elements elements;
-    for (int i = 0; i < shape_.players; ++i) {
-      for (int j = 0; j < shape_.players; ++j) {
-        for (int l = 0; l < shape_.dimension; ++l) {
-          elements.push_back({i * n_ + shape_.entry(j, l), {i + 1, j + 1, l + 1}});
-        }
+    for (int h = 0; h < shape_.hosts(); ++h) {
+      const int i = shape_.host(h);
+      for (int l = 0; l < shape_.dimension; ++l) {
+        if (const int slot = place(i, shape_.own_entry(h, l)); slot >= 0) elements.push_back({slot, {i + 1, l + 1}});
       }
     }
     return elements;
+  }
+  /// At entry(i, l), for players of an order; 0: for all.
+  Elements actions(int order = 0, bool with_plants = false) const {
+    return actions_at([&](int i, int own) {
+      if (order != 0 && shape_.order[at(i)] != order) return -1;
+      return with_plants && !shape_.has_plant(i) ? -1 : shape_.entry_of_own(own);
+    });
+  }
+  Elements own_actions() const {
+    return actions_at([](int, int own) { return own; });
+  }
+  Elements states_x() const {
+    return actions_at([&](int, int own) { return layout_.x_of(own); });
+  }
+  Elements states_reference(int order) const {
+    return actions_at([&](int i, int own) { return shape_.order[at(i)] == order ? layout_.reference_of(own) : -1; });
+  }
+  /// [i,j,l] of rows of N D numbers that begin at first: those of the players listed.
+  Elements estimates(int first, const std::vector<int>& listed) const {
+    Elements elements;
+    for (const int i : listed) {
+      for (int j = 0; j < shape_.players; ++j) {
+        for (int l = 0; l < shape_.dimension; ++l) {
+          elements.push_back({first + shape_.entry(j, l), {i + 1, j + 1, l + 1}});
+        }
+      }
+      first += shape_.actions();
+    }
+    return elements;
+  }
+  std::vector<int> hosted() const {
+    std::vector<int> list;
+    for (int h = 0; h < shape_.hosts(); ++h) list.push_back(shape_.host(h));
+    return list;
   }
   Elements weights() const {
     Elements elements;
-    for (int i = 0; i < shape_.players; ++i) {
+    for (int h = 0; h < shape_.hosts(); ++h) {
       for (int m = 0; m < shape_.neurons; ++m) {
         for (int l = 0; l < shape_.dimension; ++l) {
-          elements.push_back({m * n_ + shape_.entry(i, l), {i + 1, m + 1, l + 1}});
+          elements.push_back({layout_.weights_of(m) + shape_.own_entry(h, l), {shape_.host(h) + 1, m + 1, l + 1}});
         }
       }
     }
+    return elements;
+  }
+  Elements initial_weights() const {
+    Elements elements;
+    for (const int i : hosted()) {
+      for (int m = 0; m < shape_.neurons; ++m) {
+        for (int l = 0; l < shape_.dimension; ++l) {
+          elements.push_back({m * shape_.actions() + shape_.entry(i, l), {i + 1, m + 1, l + 1}});
+        }
+      }
+    }
+    return elements;
+  }
+  /// Entries of a joint action, at the inputs from first on.
+  Elements input_actions(int first, const std::vector<int>& entries) const {
+    Elements elements;
+    for (const int entry : entries) {
+      elements.push_back({first++, {shape_.player_of(entry) + 1, shape_.coordinate_of(entry) + 1}});
+    }
+    std::sort(elements.begin(), elements.end(), [](const Element& a, const Element& b) { return a.index < b.index; });
     return elements;
   }
 
@@ -160,7 +197,7 @@ class ModelVariables::Builder {
     family.count = static_cast<int>(elements.size());
     const int number = static_cast<int>(table_.families_.size());
     for (const auto& [slot, index] : elements) {
-      const int state = family.state >= 0 ? family.state + slot : -1;
+      const int state = family.is_state ? slot : -1;
       table_.variables_.push_back({number, slot, index, family.type, family.stage, state, family.signal});
     }
     table_.families_.push_back(std::move(family));
@@ -200,8 +237,9 @@ class ModelVariables::Builder {
     };
     family.game_family = static_cast<int>(game_family);
     family.coefficient = number;
+    const bool of_plants = game_family > 0;  // costs alone are not
     add(std::move(family),
-        elements(coefficient.indices, game_.parameters.families()[game_family]->coefficients[number]));
+        elements(coefficient.indices, of_plants, game_.parameters.families()[game_family]->coefficients[number]));
   }
   // Those of the game file; their order is that of the file.
   void add_named_parameters() {
@@ -236,16 +274,19 @@ class ModelVariables::Builder {
   void require_distinct_names() const {
     std::set<std::string_view> seen;
     for (const Family& family : table_.families()) {
-      if (seen.insert(family.name).second) continue;
+      if (!family.is_named) seen.insert(family.name);
+    }
+    for (const Family& family : table_.families()) {
+      if (!family.is_named || !seen.contains(family.name)) continue;
       throw GameError("parameters." + family.name + " has the name of a variable, expected another name");
     }
   }
-  Elements elements(Indices indices, const std::vector<Real>& values) const {
+  Elements elements(Indices indices, bool of_plants, const std::vector<Real>& values) const {
     switch (indices) {
       case Indices::player:
-        return players();
+        return players(0, of_plants);
       case Indices::entry:
-        return actions();
+        return actions(0, of_plants);
       case Indices::pair:
         return pairs(values);
       case Indices::term:
@@ -256,7 +297,7 @@ class ModelVariables::Builder {
   // [i,j], i != j; where not everything is exposed, those that are not zero
   Elements pairs(const std::vector<Real>& values) const {
     Elements elements;
-    for (int i = 0; i < shape_.players; ++i) {
+    for (const int i : hosted()) {
       for (int j = 0; j < shape_.players; ++j) {
         const int slot = i * shape_.players + j;
         if (i != j && (everything() || values[at(slot)] != 0.0)) elements.push_back({slot, {i + 1, j + 1}});
@@ -329,7 +370,7 @@ class ModelVariables::Builder {
       std::fill_n(first, per_player ? 1 : N, value);
     };
     Elements centers;
-    for (int i = 0; i < (per_player ? N : 1); ++i) {
+    for (const int i : per_player ? hosted() : std::vector<int>{0}) {
       for (int m = 0; m < shape_.neurons; ++m) {
         centers.push_back({m * N + i, per_player ? Index{i + 1, m + 1} : Index{m + 1}});
       }
@@ -354,10 +395,11 @@ class ModelVariables::Builder {
       graph.set_weight(slot / graph.players(), slot % graph.players(), value);
     };
     Elements pairs;
-    for (int i = 0; i < shape_.players; ++i) {
-      for (int j = directed ? 0 : i + 1; j < shape_.players; ++j) {
-        if (j == i) continue;
-        if (!everything() && game_.parameters.graph.weight(i, j) == 0.0) continue;
+    for (const int i : hosted()) {
+      for (int j = 0; j < shape_.players; ++j) {
+        if (j == i || (!directed && j < i && shape_.host_number(j) >= 0)) continue;
+        const bool must_be_edge = !everything() || !shape_.hosts_all();  // a player elsewhere is heard or not, for good
+        if (must_be_edge && game_.parameters.graph.weight(i, j) == 0.0) continue;
         pairs.push_back({i * shape_.players + j, {i + 1, j + 1}});
       }
     }
@@ -379,6 +421,7 @@ class ModelVariables::Builder {
     };
     add(std::move(perturbed), one());
 
+    if (!shape_.hosts_all()) return;
     Family allow =
         parameter("allow_disconnected", "Accept a communication graph that is not connected", Variability::fixed);
     allow.type = Type::boolean;
@@ -388,15 +431,15 @@ class ModelVariables::Builder {
   }
 
   void add_initial_state() {
-    add_initial<&InitialState::x>("x0", "Initial action", "Action", "1", actions());
-    add_initial<&InitialState::reference>("v0", "Initial velocity", "Velocity", "1/s", actions(2));
+    add_initial<&InitialState::x>("x0", "Initial action", "Action", "1", actions(0, true));
+    add_initial<&InitialState::reference>("v0", "Initial velocity", "Velocity", "1/s", actions(2, true));
     add_initial<&InitialState::reference>("z0", "Initial reference", "Action", "1", actions(1));
     if (everything()) {
       add_initial<&InitialState::y>("y0", "Initial estimate by player i of the action of player j", "Action", "1",
-                                    estimates());
+                                    estimates(0, hosted()));
       if (!game_.parameters.initial.W.empty()) {
         add_initial<&InitialState::W>("W0", "Initial network weight of player i, neuron m, coordinate l", "Weight",
-                                      nullptr, weights());
+                                      nullptr, initial_weights());
         table_.families_.back().unit = drive;
       }
     }
@@ -420,17 +463,36 @@ class ModelVariables::Builder {
     add(std::move(absolute), one());
   }
 
-  void add_input() {
-    add({.name = "d_ext",
-         .description = "External disturbance, added to d_il(t)",
+  void add_input(const char* name, const char* description, const char* type, std::array<const char*, 2> unit,
+                 const Elements& elements) {
+    if (elements.empty()) return;
+    add({.name = name,
+         .description = description,
          .causality = Causality::input,
          .initial = Initial::exact,
-         .declared_type = "Drive",
-         .unit = drive,
-         .stage = Stage::input,
-         .read = [](const View& view, int slot) { return view.d_ext[slot]; },
-         .write = [](Settings& settings, int slot, Real value) { settings.input.set_value(slot, value); }},
-        actions());
+         .declared_type = type,
+         .unit = unit,
+         .stage = Stage::inputs,
+         .read = [](const View& view, int slot) { return view.inputs[slot]; },
+         .write = [](Settings& settings, int slot, Real value) { settings.inputs.set_value(slot, value); }},
+        elements);
+  }
+  void add_inputs() {
+    add_input("d_ext", "External disturbance, added to d_il(t)", "Drive", drive,
+              actions_at([&](int i, int own) { return shape_.has_plant(i) ? inputs_.d_ext() + own : -1; }));
+    add_input("x", "Action of a plant outside", "Action", {"1", "1"}, input_actions(inputs_.x(), inputs_.actions()));
+    add_input("v", "Velocity of a plant outside", "Velocity", {"1/s", "1/s"},
+              input_actions(inputs_.v(), inputs_.velocities()));
+    add_input("y", "Estimate by player i, who is heard, of the action of player j", "Action", {"1", "1"},
+              estimates(inputs_.y_of(0), inputs_.heard()));
+    Elements shared;
+    for (std::size_t k = 0; k < inputs_.heard().size(); ++k) {
+      for (int l = 0; l < shape_.dimension; ++l) {
+        shared.push_back({inputs_.xbar_of(static_cast<int>(k)) + l, {inputs_.heard()[k] + 1, l + 1}});
+      }
+    }
+    add_input("xbar", "Signal shared by a player who is heard: z (order 1) or x (order 2)", "Action", {"1", "1"},
+              shared);
   }
 
   void add_outputs() {
@@ -441,9 +503,9 @@ class ModelVariables::Builder {
          .unit = {"1", "1"},
          .nominal = 1.0,
          .stage = Stage::state,
-         .state = layout_.x(),
-         .read_along = read_state_along<&StateLayout::x>},
-        actions());
+         .is_state = true,
+         .read_along = read_state_along},
+        states_x());
     x_ = last_family();
     add({.name = "v",
          .description = "Velocity",
@@ -452,9 +514,9 @@ class ModelVariables::Builder {
          .unit = {"1/s", "1/s"},
          .nominal = 1.0,
          .stage = Stage::state,
-         .state = layout_.reference(),
-         .read_along = read_state_along<&StateLayout::reference>},
-        actions(2));
+         .is_state = true,
+         .read_along = read_state_along},
+        states_reference(2));
     v_ = last_family();
     add({.name = "u",
          .description = "Control input of the plant",
@@ -464,21 +526,22 @@ class ModelVariables::Builder {
          .stage = Stage::signals,
          .signal = &Signals::control,
          .read_along = [](const View&, const Tangent& tangent, int slot) { return tangent.control[slot]; }},
-        actions());
+        own_actions());
+    if (!shape_.hosts_all()) {
+      add_signals_for_others();
+      return;
+    }
     add({.name = "nash_error",
          .description = "Distance from the Nash equilibrium: 2-norm of x - x_star",
          .causality = Causality::output,
          .declared_type = "Action",
          .unit = {"1", "1"},
          .stage = Stage::equilibrium,
-         .read =
-             [](const View& view, int) {
-               return nash_error(view.state + view.loop->layout().x(), view.x_star, view.loop->shape().actions());
-             },
+         .read = [](const View& view,
+                    int) { return nash_error(view.plants.x, view.x_star, view.loop->shape().actions()); },
          .read_along =
              [](const View& view, const Tangent& tangent, int) {
-               const int x = view.loop->layout().x();
-               return nash_error_along(view.state + x, view.x_star, tangent.state + x, tangent.x_star,
+               return nash_error_along(view.plants.x, view.x_star, tangent.actions, tangent.x_star,
                                        view.loop->shape().actions());
              }},
         one());
@@ -494,6 +557,37 @@ class ModelVariables::Builder {
         actions());
   }
 
+  /// What other loops hear of the hosted players.
+  void add_signals_for_others() {
+    add({.name = "xbar",
+         .description = "Signal shared with neighbours: z (order 1) or x (order 2)",
+         .causality = Causality::output,
+         .declared_type = "Action",
+         .unit = {"1", "1"},
+         .stage = Stage::state,
+         .read =
+             [](const View& view, int slot) {
+               const Shape& shape = view.loop->shape();
+               return (shape.is_second_order(shape.player_of(slot)) ? view.plants.x : view.plants.reference)[slot];
+             },
+         .read_along = [](const View&, const Tangent& tangent, int slot) { return tangent.shared[slot]; }},
+        actions());
+    add_estimates(Causality::output);
+  }
+  void add_estimates(Causality causality) {
+    add({.name = "y",
+         .description = "Estimate by player i of the action of player j",
+         .causality = causality,
+         .declared_type = "Action",
+         .unit = {"1", "1"},
+         .nominal = 1.0,
+         .stage = Stage::state,
+         .is_state = true,
+         .read_along = read_state_along},
+        estimates(layout_.estimates(), hosted()));
+    y_ = last_family();
+  }
+
   void add_inside_of_the_loop() {
     const std::vector<Real>& W_max = game_.parameters.rbf.W_max;
     const Real W_nominal = std::sqrt(*std::max_element(W_max.begin(), W_max.end()));
@@ -503,31 +597,21 @@ class ModelVariables::Builder {
          .unit = {"1", "1"},
          .nominal = 1.0,
          .stage = Stage::state,
-         .state = layout_.reference(),
-         .read_along = read_state_along<&StateLayout::reference>},
-        actions(1));
+         .is_state = true,
+         .read_along = read_state_along},
+        states_reference(1));
     const int z = last_family();
-    int y = -1;
     int W = -1;
     if (everything()) {
-      add({.name = "y",
-           .description = "Estimate by player i of the action of player j",
-           .declared_type = "Action",
-           .unit = {"1", "1"},
-           .nominal = 1.0,
-           .stage = Stage::state,
-           .state = layout_.estimates(),
-           .read_along = read_state_along<&StateLayout::estimates>},
-          estimates());
-      y = last_family();
+      if (shape_.hosts_all()) add_estimates(Causality::local);
       add({.name = "W",
            .description = "Network weight of player i, neuron m, coordinate l",
            .declared_type = "Weight",
            .unit = drive,
            .nominal = W_nominal,
            .stage = Stage::state,
-           .state = layout_.weights(),
-           .read_along = read_state_along<&StateLayout::weights>},
+           .is_state = true,
+           .read_along = read_state_along},
           weights());
       W = last_family();
     }
@@ -544,26 +628,36 @@ class ModelVariables::Builder {
                }
                return squares;
              }},
-        actions());
+        own_actions());
     add({.name = "phi",
          .description = "Robust term of the control",
          .declared_type = "Drive",
          .unit = drive,
          .stage = Stage::signals,
          .signal = &Signals::robust},
-        actions());
+        own_actions());
     add({.name = "nn",
          .description = "Output of the neural network",
          .declared_type = "Drive",
          .unit = drive,
          .stage = Stage::signals,
          .signal = &Signals::network},
-        actions());
+        own_actions());
+    if (shape_.hosts_all()) add_measures();
+    if (everything()) {
+      add_derivatives(x_, {"1/s", "1/s"});
+      add_derivatives(v_, {"1/s2", "1/s2"});
+      add_derivatives(z, {"1/s", "1/s"});
+      add_derivatives(y_, {"1/s", "1/s"});
+      add_derivatives(W, {"1/s2", "1/s3"});
+    }
+  }
+
+  void add_measures() {
     add({.name = "cost",
          .description = "Cost f_i(x)",
          .stage = Stage::state,
-         .read = [](const View& view,
-                    int i) { return view.loop->parameters().cost->value(i, view.state + view.loop->layout().x()); }},
+         .read = [](const View& view, int i) { return view.loop->parameters().cost->value(i, view.plants.x); }},
         players());
     add({.name = "consensus_error",
          .description = "2-norm of all errors of the estimates",
@@ -575,27 +669,23 @@ class ModelVariables::Builder {
     add({.name = "gradient_norm",
          .description = "2-norm of the own-action gradients at x",
          .stage = Stage::state,
-         .read = [](const View& view, int) { return gradient_norm(*view.loop, view.state + view.loop->layout().x()); }},
+         .read = [](const View& view, int) { return gradient_norm(*view.loop, view.plants.x); }},
         one());
-    if (everything()) {
-      add_derivatives<&StateLayout::x>(x_, {"1/s", "1/s"}, actions());
-      add_derivatives<&StateLayout::reference>(v_, {"1/s2", "1/s2"}, actions(2));
-      add_derivatives<&StateLayout::reference>(z, {"1/s", "1/s"}, actions(1));
-      add_derivatives<&StateLayout::estimates>(y, {"1/s", "1/s"}, estimates());
-      add_derivatives<&StateLayout::weights>(W, {"1/s2", "1/s3"}, weights());
-    }
   }
 
-  template <auto Offset>
-  void add_derivatives(int states, std::array<const char*, 2> unit, const Elements& elements) {
+  void add_derivatives(int states, std::array<const char*, 2> unit) {
     const Family& family = table_.families_[at(states)];
+    Elements elements;
+    for (int k = family.first; k < family.first + family.count; ++k) {
+      elements.push_back({table_.variables_[at(k)].slot, table_.variables_[at(k)].index});
+    }
     add({.name = "der(" + family.name,
          .description = "Time derivative of " + family.name,
          .unit = unit,
          .stage = Stage::signals,
          .derivative_of = states,
-         .read = read_rate<Offset>,
-         .read_along = read_rate_along<Offset>},
+         .read = [](const View& view, int slot) { return view.rate[slot]; },
+         .read_along = [](const View&, const Tangent& tangent, int slot) { return tangent.rate[slot]; }},
         elements);
   }
 
@@ -633,9 +723,10 @@ class ModelVariables::Builder {
   const Game& game_;
   const Shape& shape_;
   StateLayout layout_;
-  int n_;
+  InputLayout inputs_;
   int x_ = -1;
   int v_ = -1;
+  int y_ = -1;
 };
 
 ModelVariables::ModelVariables(const Game& game) : order_(game.parameters.shape.order) {
@@ -646,12 +737,10 @@ ModelVariables::ModelVariables(const Game& game) : order_(game.parameters.shape.
   if (game.expose == Expose::all) {
     states_.resize(at(StateLayout(game.parameters.shape).size()));
     for (int reference = 0; reference < size(); ++reference) {
-      if (const int first = family(reference).state; first >= 0) {
-        states_[at(first + variable(reference).slot)] = reference;
-      }
+      if (family(reference).is_state) states_[at(variable(reference).slot)] = reference;
     }
   }
-  input_numbers_ = ExternalDisturbance(game.parameters.shape.actions()).numbers().size();
+  input_numbers_ = Settings(game).inputs.numbers().size();
 }
 
 std::string ModelVariables::name(int reference) const {
@@ -694,7 +783,7 @@ std::vector<Real> ModelVariables::save(const Settings& settings) const {
   std::vector<Real> numbers;
   numbers.reserve(saved_size());
   for (const int reference : settable_) numbers.push_back(read(reference, view));
-  const std::span<const Real> input = settings.input.numbers();
+  const std::span<const Real> input = settings.inputs.numbers();
   numbers.insert(numbers.end(), input.begin(), input.end());
   return numbers;
 }
@@ -703,7 +792,7 @@ void ModelVariables::load(std::span<const Real> numbers, Settings& settings) con
   for (std::size_t k = 0; k < settable_.size(); ++k) {
     family(settable_[k]).write(settings, variable(settable_[k]).slot, numbers[k]);
   }
-  settings.input.set_numbers(numbers.subspan(settable_.size()));
+  settings.inputs.set_numbers(numbers.subspan(settable_.size()));
   settings.parameters.refresh();
 }
 

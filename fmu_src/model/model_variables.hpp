@@ -70,6 +70,8 @@ struct Unit {
 };
 std::span<const Unit> units();
 
+/// Variables of one kind. Two families may share a name: actions of plants inside the loop are outputs, those of plants
+/// outside are inputs.
 struct Family {
   std::string name;
   std::string description;
@@ -85,7 +87,7 @@ struct Family {
   Stage stage = Stage::settings;
   bool moves_equilibrium = false;
   int derivative_of = -1;  ///< family of states of which this one holds the derivatives, element by element
-  int state = -1;          ///< of states: position of slot 0 in the state vector
+  bool is_state = false;   ///< slots are positions in the state vector, as those of derivatives
 
   AlignedVector Signals::* signal = nullptr;  ///< the vector of signals that holds the elements at their slots
 
@@ -108,7 +110,7 @@ struct Family {
 
 struct Variable {
   int family = 0;
-  int slot = 0;                ///< position in the arrays of the core
+  int slot = 0;                ///< position in an array of the core: of inputs, in that of InputLayout
   std::array<int, 3> index{};  ///< public indices, from one; 0 where there is none
   // the family's, side by side for the calls that importers make after every step
   Type type = Type::real;

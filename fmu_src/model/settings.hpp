@@ -2,20 +2,20 @@
 #pragma once
 
 #include "closed_loop.hpp"
-#include "external_disturbance.hpp"
 #include "game.hpp"
 #include "integrator.hpp"
+#include "loop/inputs.hpp"
 
 namespace mixed_order_game {
 
 struct Settings {
-  explicit Settings(const Game& game) : parameters(game.parameters), input(game.parameters.shape.actions()) {}
+  explicit Settings(const Game& game) : parameters(game.parameters), inputs(InputLayout(game.parameters).size()) {}
 
   Parameters parameters;
   bool allow_disconnected = false;
   Real tolerance_relative = 0.0;  ///< 0: not set
   Real tolerance_absolute = 0.0;  ///< 0: not set
-  ExternalDisturbance input;      ///< d_ext
+  Inputs inputs;                  ///< as ClosedLoop::inputs says
 };
 
 /// What differs between two sets of settings; parameters include inputs.
@@ -24,7 +24,7 @@ enum class Change { none, input, parameters };
 /// What has to be computed before a variable can be read.
 enum class Stage {
   settings,     ///< nothing
-  input,        ///< d_ext
+  inputs,       ///< the inputs, as they were set
   state,        ///< time and state
   signals,      ///< signals and rates of the closed loop
   statistics,   ///< the work done
@@ -36,8 +36,10 @@ struct View {
   const Settings* settings = nullptr;
   const ClosedLoop* loop = nullptr;
   Real time = 0.0;
-  const Real* d_ext = nullptr;
+  const Real* inputs = nullptr;         ///< as they were set
+  const Real* acting_inputs = nullptr;  ///< those that act now
   const Real* state = nullptr;
+  Plants plants{};
   const Real* rate = nullptr;
   const Signals* signals = nullptr;
   const Real* x_star = nullptr;  ///< null unless it is known
@@ -48,7 +50,10 @@ struct View {
 struct Tangent {
   const Real* state = nullptr;
   const Real* rate = nullptr;
+  const Real* inputs = nullptr;
   const Real* control = nullptr;
+  const Real* actions = nullptr;
+  const Real* shared = nullptr;
   const Real* x_star = nullptr;
 };
 

@@ -24,14 +24,14 @@ bool is_unknown(const Model& model, int reference, Equations equations) {
   const Family& family = model.variables.family(reference);
   if (family.causality == Causality::output || family.derivative_of >= 0) return true;
   if (equations == Equations::running) return false;
-  return family.causality == Causality::calculated_parameter || (family.state >= 0 && states_are_variables(model));
+  return family.causality == Causality::calculated_parameter || (family.is_state && states_are_variables(model));
 }
 
 bool is_known(const Model& model, int reference, Equations equations) {
   const Family& family = model.variables.family(reference);
   if (family.causality == Causality::input || family.causality == Causality::independent) return true;
   return equations == Equations::initial ? family.causality == Causality::parameter
-                                         : family.state >= 0 && states_are_variables(model);
+                                         : family.is_state && states_are_variables(model);
 }
 
 std::string why_no_unknown(const Model& model, int reference, Equations equations) {

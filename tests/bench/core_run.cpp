@@ -63,7 +63,7 @@ int run(int count, char** arguments) {
   if (!file) throw std::runtime_error(std::string("cannot read ") + arguments[1]);
   const std::string text{std::istreambuf_iterator<char>(file), {}};
   const ClosedLoop loop(parse_game(text).parameters);
-  const ExternalDisturbance input(loop.shape().actions());
+  const Inputs input(loop.shape().actions());
   Integrator integrator(loop, input, make_solver(options["--solver"]));
 
   const auto kept = at(2 * loop.shape().actions());  // x and z or v

@@ -83,7 +83,7 @@ int run(char** arguments) {
   const std::string text{std::istreambuf_iterator<char>(file), {}};
   const ClosedLoop loop(parse_game(text).parameters);
   const Shape& shape = loop.shape();
-  const ExternalDisturbance input(shape.actions());
+  const Inputs input(shape.actions());
 
   const auto instantiate = library.function<fmi2InstantiateTYPE>("fmi2Instantiate");
   const auto set_up = library.function<fmi2SetupExperimentTYPE>("fmi2SetupExperiment");

@@ -12,10 +12,10 @@
 #include <stdexcept>
 #include <string>
 
-#include "external_disturbance.hpp"
 #include "game.hpp"
 #include "integrator.hpp"
 #include "kernels/kernels.hpp"
+#include "loop/inputs.hpp"
 #include "loop_jacobian.hpp"
 #include "newton_solver.hpp"
 
@@ -44,7 +44,7 @@ struct Scene {
     std::copy_n(integrator.state(), state.size(), state.begin());
     modes = integrator.modes();
     evaluate();
-    jacobian.linearize(state.data(), signals, modes);
+    jacobian.linearize(state.data(), loop.plants(state.data(), nullptr, signals), signals, modes);
     solver->refresh(jacobian);
     if (!solver->factor(jacobian, gamma)) throw std::runtime_error("singular Newton matrix");
   }
@@ -81,7 +81,7 @@ struct Scene {
   static constexpr Real time = 0.5;
   static constexpr Real gamma = 2e-3;
   ClosedLoop loop;
-  ExternalDisturbance input;
+  Inputs input;
   Signals signals;
   AlignedVector state;
   AlignedVector rate;
@@ -114,7 +114,8 @@ void register_scene(const std::string& name, const std::string& path) {
   });
   benchmark::RegisterBenchmark(("setup/" + name).c_str(), [scene, size](benchmark::State& runs) {
     for (auto _ : runs) {
-      scene->jacobian.linearize(scene->state.data(), scene->signals, scene->modes);
+      scene->jacobian.linearize(scene->state.data(), scene->loop.plants(scene->state.data(), nullptr, scene->signals),
+                                scene->signals, scene->modes);
       if (!scene->solver->factor(scene->jacobian, Scene::gamma)) runs.SkipWithError("singular Newton matrix");
       benchmark::ClobberMemory();
     }

@@ -49,7 +49,7 @@ TEST(Allocation, NoneAfterTheStart) {
     testing::PlainGame game = testing::random_game(recipe);
     game.W_max = testing::everyone(game, 1.0);  // the sphere is reached and left
     ClosedLoop loop(parse_game(testing::toml_of(game)).parameters);
-    ExternalDisturbance input(loop.shape().actions());
+    Inputs input(loop.inputs().size());
     Integrator integrator(loop, input, make_structured_newton());
     integrator.start(0.0, {1e-6, 1e-8});
     integrator.advance(0.01);
@@ -76,9 +76,9 @@ TEST(Allocation, NoneAlongADirection) {
     counting = true;
     loop.evaluate(0.1, state.data(), input.data(), inside, signals, rate.data());
     tangent.state.back() = 1.0;
-    tangent.d_ext.back() = 1.0;
+    tangent.inputs.back() = 1.0;
     tangent.time = 1.0;
-    tangent.follow(0.1, state.data(), inside);
+    tangent.follow(0.1, state.data(), input.data(), inside);
     counting = false;
     EXPECT_EQ(allocations, 0) << "game " << recipe.seed;
   }

@@ -168,7 +168,7 @@ TEST_P(ClosedLoopOfRandomGame, EventFunctionsBelongToTheirStateWhateverTheSignal
   Signals signals(loop_.shape());  // of no state yet
   std::vector<Real> values(modes.size());
   constexpr Real tolerance = 1e-4;
-  loop_.event_functions(state.flat().data(), modes, tolerance, signals, values.data());
+  loop_.event_functions(state.flat().data(), nullptr, modes, tolerance, signals, values.data());
   for (std::size_t p = 0; p < modes.size(); ++p) {
     const Real height = norm2[p] / game_.W_max[p % game_.players] - 1.0;
     const Real falling = -2.0 * game_.beta[p % game_.players] * error[p] * network[p] / game_.W_max[p % game_.players];
@@ -232,7 +232,7 @@ TEST_F(TwoScalarPlayers, ModesFollowTheNormAndTheDirection) {
     state[at(w1)] = std::sqrt(norm2);
     state[at(x1)] = state[at(z1)] + e;
     const Modes before = modes;
-    const int changed = loop_.resolve_modes(state.data(), tolerance, signals_, modes);
+    const int changed = loop_.resolve_modes(state.data(), nullptr, tolerance, signals_, modes);
     EXPECT_EQ(changed, before != modes ? 1 : 0);
     return modes;
   };
@@ -252,7 +252,7 @@ TEST_F(TwoScalarPlayers, WithoutTheNetworkNoColumnReachesTheSphere) {
   loop_.parameters().strategy.robust = false;
   const std::vector<Real> state(at(layout_.size()), 10.0);
   Modes modes(2, 0);
-  EXPECT_EQ(loop_.resolve_modes(state.data(), 1e-6, signals_, modes), 0);
+  EXPECT_EQ(loop_.resolve_modes(state.data(), nullptr, 1e-6, signals_, modes), 0);
   EXPECT_EQ(modes, (Modes{0, 0}));
 }
 
@@ -279,7 +279,7 @@ TEST(ProjectedState, LiesOnTheSphereOrInsideIt) {
   }
   std::vector<Real> state = before.flat();
   Signals signals(loop.shape());
-  loop.project(modes_of(on_sphere), signals, state.data());
+  loop.project(modes_of(on_sphere), nullptr, signals, state.data());
   LoopState<Real> after(game);
   after.set_flat(state);
   EXPECT_EQ(after.x, before.x);

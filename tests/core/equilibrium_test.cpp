@@ -41,7 +41,7 @@ TEST(NashEquilibrium, MakesEveryGradientVanish) {
 
 TEST(NashEquilibrium, OfTwoPlayersByHand) {
   // f_1 = x_1^2 + 3 (x_1 - x_2)^2 - 8 x_1, f_2 = 2 x_2^2 - 4 x_2: x_2 = 1 and 8 x_1 = 6 x_2 + 8
-  QuadraticCost cost(2, 1);
+  QuadraticCost cost({.players = 2, .dimension = 1, .order = {}});
   cost.coefficients[QuadraticCost::quadratic] = {1.0, 2.0};
   cost.coefficients[QuadraticCost::linear] = {-8.0, -4.0};
   cost.coefficients[QuadraticCost::coupling] = {0.0, 3.0, 0.0, 0.0};
@@ -54,7 +54,7 @@ TEST(NashEquilibrium, OfTwoPlayersByHand) {
 
 TEST(NashEquilibrium, IsRefusedWhereItIsNotUnique) {
   // both players only wish to meet, wherever
-  QuadraticCost cost(2, 1);
+  QuadraticCost cost({.players = 2, .dimension = 1, .order = {}});
   cost.coefficients[QuadraticCost::coupling] = {0.0, 1.0, 1.0, 0.0};
   cost.refresh();
   const Shape shape{.players = 2, .dimension = 1, .neurons = 1, .order = {1, 1}};
@@ -66,7 +66,7 @@ TEST(NashEquilibrium, IsRefusedWhereItIsNotUnique) {
 
 TEST(NashEquilibrium, IsRefusedWhereAPlayerCouldLowerItsCost) {
   const Shape shape{.players = 2, .dimension = 1, .neurons = 1, .order = {1, 1}};
-  QuadraticCost cost(2, 1);
+  QuadraticCost cost({.players = 2, .dimension = 1, .order = {}});
   cost.coefficients[QuadraticCost::quadratic] = {0.3, 0.3};
   cost.coefficients[QuadraticCost::linear] = {1.0, 0.0};
   cost.coefficients[QuadraticCost::coupling] = {0.0, 2.0, -2.0, 0.0};
@@ -86,7 +86,7 @@ TEST(NashEquilibrium, IsRefusedWhereAPlayerCouldLowerItsCost) {
   // 0.1 + 0.2 - 0.3 is no curvature, and neither is its rounding error in either direction
   for (const Real sign : {1.0, -1.0}) {
     const Shape three{.players = 3, .dimension = 1, .neurons = 1, .order = {1, 1, 1}};
-    QuadraticCost flat(3, 1);
+    QuadraticCost flat({.players = 3, .dimension = 1, .order = {}});
     flat.coefficients[QuadraticCost::quadratic] = {-0.3 * sign, 1.0, 1.0};
     flat.coefficients[QuadraticCost::coupling] = {0.0, 0.1 * sign,  0.2 * sign, -0.2 * sign, 0.0,
                                                   0.0, -0.2 * sign, 0.0,        0.0};
@@ -102,7 +102,7 @@ TEST(NashEquilibrium, IsRefusedWhereAPlayerCouldLowerItsCost) {
 
 TEST(NashEquilibrium, OfRowsOfDifferentSizeIsThatOfEqualOnes) {
   const Shape shape{.players = 2, .dimension = 1, .neurons = 1, .order = {1, 1}};
-  QuadraticCost cost(2, 1);
+  QuadraticCost cost({.players = 2, .dimension = 1, .order = {}});
   cost.coefficients[QuadraticCost::quadratic] = {1e-7, 1e7};
   cost.coefficients[QuadraticCost::linear] = {1e-7, 1e7};
   cost.coefficients[QuadraticCost::coupling] = {0.0, 1e-7, 1e7, 0.0};
@@ -218,7 +218,7 @@ TEST(NashEquilibrium, IsRefusedWhereTheStepsDoNotConverge) {
 TEST(NashEquilibrium, ThatIsIllConditionedConverges) {
   const Shape shape{.players = 2, .dimension = 1, .neurons = 1, .order = {1, 1}};
   for (const Real weak : {1e-6, 1e-9, 1e-12}) {
-    QuadraticCost cost(2, 1);
+    QuadraticCost cost({.players = 2, .dimension = 1, .order = {}});
     cost.coefficients[QuadraticCost::quadratic] = {weak, 0.0};
     cost.coefficients[QuadraticCost::linear] = {-6.0 * weak, 0.0};
     cost.coefficients[QuadraticCost::coupling] = {0.0, 0.7, 0.3, 0.0};
@@ -289,7 +289,7 @@ TEST(NashEquilibrium, MovesWithTheCosts) {
   for (const auto& recipe : assorted_recipes()) {
     const Parameters parameters = parse_game(toml_of(random_game(recipe))).parameters;
     const auto& cost = static_cast<const QuadraticCost&>(*parameters.cost);
-    QuadraticCost direction(parameters.shape.players, parameters.shape.dimension);
+    QuadraticCost direction(parameters.shape);
     random.fill(direction.coefficients[QuadraticCost::quadratic], -1.0, 1.0);
     random.fill(direction.coefficients[QuadraticCost::linear], -1.0, 1.0);
     random.fill(direction.coefficients[QuadraticCost::coupling], -1.0, 1.0);
@@ -318,7 +318,7 @@ TEST(NashEquilibrium, MovesWithTheCosts) {
 
 // Player 3 follows 2, 2 follows 1, and 1 follows nobody: what is downstream cannot be felt, not even by rounding.
 TEST(NashEquilibrium, OfAPlayerThatFollowsNobodyStandsStill) {
-  QuadraticCost cost(3, 1);
+  QuadraticCost cost({.players = 3, .dimension = 1, .order = {}});
   cost.coefficients[QuadraticCost::quadratic] = {0.3, 0.7, 0.1};
   cost.coefficients[QuadraticCost::linear] = {1.0, -2.0, 0.5};
   cost.coefficients[QuadraticCost::coupling] = {0.0, 0.0, 0.0, 9.0, 0.0, 0.0, 0.0, 7.0, 0.0};
@@ -326,7 +326,7 @@ TEST(NashEquilibrium, OfAPlayerThatFollowsNobodyStandsStill) {
   const Shape shape{.players = 3, .dimension = 1, .neurons = 1, .order = {1, 1, 1}};
   const std::vector<Real> x_star = nash_equilibrium(cost, shape);
   EXPECT_DOUBLE_EQ(x_star[0], -1.0 / 0.6);
-  QuadraticCost direction(3, 1);
+  QuadraticCost direction({.players = 3, .dimension = 1, .order = {}});
   direction.coefficients[QuadraticCost::linear] = {0.0, 0.9, 0.8};
   direction.refresh();
   const std::vector<Real> along = nash_equilibrium_along(cost, direction, shape, x_star.data());
@@ -343,7 +343,7 @@ TEST(NashEquilibrium, OfALongChainNeedsLittleStack) {
 #else
   constexpr std::size_t stack = 64 * 1024;
 #endif
-  QuadraticCost cost(players, 1);
+  QuadraticCost cost({.players = players, .dimension = 1, .order = {}});
   cost.coefficients[QuadraticCost::quadratic].assign(players, 1.0);
   for (int i = 0; i + 1 < players; ++i) cost.coefficients[QuadraticCost::coupling][at(i * players + i + 1)] = 1e-3;
   cost.coefficients[QuadraticCost::linear].back() = -1.0;
@@ -372,7 +372,7 @@ TEST(NashEquilibrium, OfALongChainNeedsLittleStack) {
 
 TEST(StrongMonotonicity, IsTheSmallestEigenvalueOfTheSymmetricPart) {
   // P' = [[2 q_1 + 2 c_12, -2 c_12], [-2 c_21, 2 q_2 + 2 c_21]] with q = (1, 2), c_12 = 3, c_21 = 0
-  QuadraticCost cost(2, 1);
+  QuadraticCost cost({.players = 2, .dimension = 1, .order = {}});
   cost.coefficients[QuadraticCost::quadratic] = {1.0, 2.0};
   cost.coefficients[QuadraticCost::coupling] = {0.0, 3.0, 0.0, 0.0};
   cost.refresh();

@@ -43,7 +43,7 @@ struct Simulation {
   }
 
   ClosedLoop loop;
-  ExternalDisturbance input;
+  Inputs input;
   Integrator integrator;
 };
 
@@ -260,7 +260,7 @@ TEST(Integrator, SlidesWithARobustTermAsSteepAsTheTheoremsAskFor) {
   for (int k = 0; k < 1000; ++k) gradient_step(end / 1000);
 
   const std::vector<Real> x_star = nash_equilibrium(*loop.parameters().cost, loop.shape());
-  const ExternalDisturbance input(loop.shape().actions());
+  const Inputs input(loop.shape().actions());
   for (const Real tolerance : {1e-4, 1e-5, 3e-6, 1e-6, 3e-7, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11}) {
     Integrator integrator(loop, input, make_structured_newton());
     integrator.start(0.0, {tolerance, 0.01 * tolerance});

@@ -295,9 +295,10 @@ TEST(Activations, AreGaussians) {
         Array exponent(players * (neurons + 2) + 8);
         Array activation(neurons * n);
         if (owners == 0) {
-          kernel.activations_diagonal(players, dimension, neurons, numbers, sharpness, y, exponent, activation);
+          kernel.activations_diagonal(players, n, dimension, neurons, numbers, sharpness, y, exponent, activation);
         } else {
-          kernel.activations_general(players, dimension, neurons, owners, vectors, sharpness, y, exponent, activation);
+          kernel.activations_general(players, n, dimension, neurons, owners, vectors, sharpness, y, exponent,
+                                     activation);
         }
         return activation;
       });
@@ -328,9 +329,9 @@ TEST(Activations, FarFromEveryCenterAreZero) {
         Array exponent(2 * 3 + 8);
         Array activation(4, 9.0);
         if (diagonal) {
-          kernel.activations_diagonal(2, 2, 1, centers, sharpness, y, exponent, activation);
+          kernel.activations_diagonal(2, 4, 2, 1, centers, sharpness, y, exponent, activation);
         } else {
-          kernel.activations_general(2, 2, 1, 1, center_vectors, sharpness, y, exponent, activation);
+          kernel.activations_general(2, 4, 2, 1, 1, center_vectors, sharpness, y, exponent, activation);
         }
         return activation;
       });
@@ -375,7 +376,7 @@ TEST(EstimateRates, AreTheConsensusLaw) {
     const Array xbar(n, random), k3(players, random);
     const Array computed = on_every_level([&](const Kernels& kernel) {
       Array rate(players * n, 9.0);
-      kernel.estimate_rates(players, dimension, ring.rows(), k3, y, xbar, rate);
+      kernel.estimate_rates(players, players, dimension, ring.rows(), ring.rows(), k3, y, xbar, rate);
       return rate;
     });
     for (int i = 0; i < players; ++i) {
@@ -433,7 +434,7 @@ TEST(SharedSignal, IsAddedToTheEstimateOfItsPlayer) {
     const Array gain(players * players, random), shared(n, random), y(players * n, random);
     const Array computed = on_every_level([&](const Kernels& kernel) {
       Array out(y);
-      kernel.add_shared_signal(players, dimension, gain, shared, out);
+      kernel.add_shared_signal(players, players, dimension, gain, shared, out);
       return out;
     });
     for (int i = 0; i < players; ++i) {
@@ -471,9 +472,8 @@ struct FullPattern {
   }
   [[nodiscard]] int entries() const { return elimination.entries(); }
   [[nodiscard]] BlockPattern pattern() const {
-    return {elimination.players(),  elimination.listed,       elimination.start.data(),
-            elimination.row.data(), elimination.order.data(), player.data(),
-            target.data()};
+    return {elimination.players(),  elimination.players(),    elimination.listed, elimination.start.data(),
+            elimination.row.data(), elimination.order.data(), player.data(),      target.data()};
   }
 };
 
@@ -542,7 +542,7 @@ TEST(Blocks, AreSolvedByTheirModes) {
     const int n = N * dimension;
     const Array vector(N * N * n, random), eigenvalue(N * n, random, 0.0, 9.0), shared(N * n, random),
         rhs(N * n, random);
-    const BlockModes modes{N, n, vector, eigenvalue, shared};
+    const BlockModes modes{N, N, n, vector, eigenvalue, shared};
     constexpr double gamma_k3 = 0.7;
     Array inverse(N * n);
     for (int k = 0; k < N * n; ++k) inverse[k] = 1.0 / (1.0 + gamma_k3 * eigenvalue[k]);

@@ -34,8 +34,9 @@ class Linearized {
     Signals signals(loop.shape());
     std::vector<Real> rate(size_);
     const std::vector<Real> no_input(at(loop.shape().actions()), 0.0);
-    loop.evaluate(0.7, state_.flat().data(), no_input.data(), modes, signals, rate.data());
-    jacobian.linearize(state_.flat().data(), signals, modes);
+    const std::vector<Real> state = state_.flat();
+    loop.evaluate(0.7, state.data(), no_input.data(), modes, signals, rate.data());
+    jacobian.linearize(state.data(), loop.plants(state.data(), nullptr, signals), signals, modes);
   }
 
   /// Dense, row by row; the activations held.

@@ -75,6 +75,7 @@ class LoopTangentOfRandomGame : public ::testing::TestWithParam<Recipe> {
   PlainGame game_ = random_game(GetParam());
   ClosedLoop loop_{parse_game(toml_of(game_)).parameters};
   LoopTangent tangent_{loop_};
+  AlignedVector no_inputs_ = AlignedVector(at(loop_.inputs().size()));
   RandomNumbers random_{3000 + GetParam().seed};
   std::size_t size_ = at(loop_.layout().size());
 
@@ -96,7 +97,7 @@ TEST_P(LoopTangentOfRandomGame, FollowsTheState) {
     Numbers direction(size_);
     random_.fill(direction, -1.0, 1.0);
     std::copy(direction.begin(), direction.end(), tangent_.state.begin());
-    tangent_.follow(t, state.flat().data(), modes_of(on_sphere));
+    tangent_.follow(t, state.flat().data(), no_inputs_.data(), modes_of(on_sphere));
     std::vector<std::complex<Real>> moved;
     const std::vector<Real> flat = state.flat();
     for (std::size_t k = 0; k < size_; ++k) moved.emplace_back(flat[k], h * direction[k]);
@@ -119,9 +120,9 @@ TEST_P(LoopTangentOfRandomGame, FollowsInputsAndTime) {
   random_.fill(direction, -1.0, 1.0);
   constexpr Real time_direction = 0.3;
   const Numbers input = flat_actions(direction);
-  std::copy(input.begin(), input.end(), tangent_.d_ext.begin());
+  std::copy(input.begin(), input.end(), tangent_.inputs.begin());
   tangent_.time = time_direction;
-  tangent_.follow(t, state.flat().data(), modes_of(on_sphere));
+  tangent_.follow(t, state.flat().data(), no_inputs_.data(), modes_of(on_sphere));
   const auto along = [&](Real s) {
     Rows moved = d_ext;
     for (std::size_t i = 0; i < game_.players; ++i) {
@@ -337,7 +338,7 @@ TEST_P(LoopTangentOfRandomGame, FollowsParametersAtTheStart) {
     Parameters direction = loop_.parameters().zero_direction();
     move.core(direction);
     direction.refresh();
-    tangent_.follow_parameters(direction, t, initial_state.data(), modes_of(inside));
+    tangent_.follow_parameters(direction, t, initial_state.data(), no_inputs_.data(), modes_of(inside));
     const auto along = [&](Real s) {
       PlainGame moved = game_;
       move.plain(moved, s);
@@ -359,7 +360,8 @@ TEST(LoopTangent, OfAnAmplitudeOfZeroHasNoRobustTerm) {
   Parameters direction = loop.parameters().zero_direction();
   direction.gains.delta = direction.gains.epsilon = everyone(game, 1.0);
   LoopTangent tangent(loop);
-  tangent.follow_parameters(direction, t, state.data(), Modes(at(loop.shape().actions())));
+  const AlignedVector no_inputs(at(loop.inputs().size()));
+  tangent.follow_parameters(direction, t, state.data(), no_inputs.data(), Modes(at(loop.shape().actions())));
   for (const Real change : rates_and_controls(tangent)) EXPECT_EQ(change, 0.0);
 }
 

@@ -54,7 +54,7 @@ class NewtonSystem {
       if (signals.error[p] * signals.network[p] < 0.0) modes[p] = 0;
     }
     loop_.evaluate(1.0, state.data(), d_ext.data(), modes, signals, rate.data());
-    jacobian_.linearize(state.data(), signals, modes);
+    jacobian_.linearize(state.data(), loop_.plants(state.data(), nullptr, signals), signals, modes);
   }
 
   void compare(Real gamma) {
@@ -134,7 +134,7 @@ TEST(StructuredNewtonRefresh, FollowsNewEdgesAndCouplings) {
   const std::vector<Real> d_ext(10, 0.0);
   const auto linearize = [&] {
     loop.evaluate(0.0, state.data(), d_ext.data(), modes, signals, rate.data());
-    jacobian.linearize(state.data(), signals, modes);
+    jacobian.linearize(state.data(), loop.plants(state.data(), nullptr, signals), signals, modes);
   };
   linearize();
   structured->refresh(jacobian);

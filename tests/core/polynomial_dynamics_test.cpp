@@ -11,7 +11,7 @@ constexpr int D = 2;
 const std::vector<Real> x{1.0, 3.0, -1.0, 2.0, 5.0, 4.0};
 
 PolynomialDynamics dynamics() {
-  PolynomialDynamics made(N, D);
+  PolynomialDynamics made({.players = N, .dimension = D, .order = {}});
   const auto slot = [](int i, int j, int l) { return (l * N + i) * N + j; };
   made.coefficients.set(PolynomialDynamics::linear, slot(2, 2, 1), 3.0);
   made.coefficients.set(PolynomialDynamics::linear, slot(0, 2, 0), 2.0);
@@ -68,7 +68,7 @@ TEST(PolynomialDynamics, ACloneKeepsGainsAndTerms) {
 }
 
 TEST(PolynomialDynamics, WithoutTermsIsZero) {
-  const PolynomialDynamics none(N, D);
+  const PolynomialDynamics none({.players = N, .dimension = D, .order = {}});
   std::vector<Real> g(N * D, 99.0);
   none.values(x.data(), nullptr, g.data());
   EXPECT_EQ(g, std::vector<Real>(N * D, 0.0));

@@ -18,7 +18,7 @@ constexpr int N = 4;
 constexpr int D = 3;
 
 QuadraticCost cost_of(const PlainGame& game) {
-  QuadraticCost cost(N, D);
+  QuadraticCost cost({.players = N, .dimension = D, .order = {}});
   for (int i = 0; i < N; ++i) {
     cost.coefficients[QuadraticCost::quadratic][at(i)] = game.quadratic[at(i)];
     cost.coefficients[QuadraticCost::constant][at(i)] = game.constant[at(i)];

@@ -2,6 +2,7 @@
 // their definition as TOML text. Nothing here uses the core's own order of entries.
 #pragma once
 
+#include <algorithm>
 #include <charconv>
 #include <cstdint>
 #include <random>
@@ -198,8 +199,17 @@ inline std::string toml_of(const Rows& rows) {
   return '[' + text + ']';
 }
 
+/// Which players of a game are elsewhere, and which of the others have plants outside.
+struct Part {
+  std::vector<std::size_t> elsewhere = {};
+  std::vector<std::size_t> external = {};
+
+  [[nodiscard]] bool is_elsewhere(std::size_t i) const { return std::ranges::count(elsewhere, i) != 0; }
+  [[nodiscard]] bool is_external(std::size_t i) const { return std::ranges::count(external, i) != 0; }
+};
+
 /// The game definition; parse_game must read back exactly these numbers.
-inline std::string toml_of(const PlainGame& game) {
+inline std::string toml_of(const PlainGame& game, const Part& part = {}) {
   const auto pairs_of = [](const Rows& rows) {  // [[j, row j], ...] of the rows that are not zero
     std::string text;
     for (std::size_t j = 0; j < rows.size(); ++j) {
@@ -226,13 +236,18 @@ inline std::string toml_of(const PlainGame& game) {
   std::string edges;
   for (std::size_t i = 0; i < game.players; ++i) {
     for (std::size_t j = game.directed ? 0 : i + 1; j < game.players; ++j) {
-      if (game.adjacency[j][i] == 0.0) continue;
+      if (game.adjacency[j][i] == 0.0 || (part.is_elsewhere(j) && (game.directed || part.is_elsewhere(i)))) continue;
       edges += (edges.empty() ? "[" : ", [") + std::to_string(i + 1) + ", " + std::to_string(j + 1) + ", " +
                toml_of(game.adjacency[j][i]) + ']';
     }
   }
   text += std::string("[graph]\n") + (game.directed ? "directed = true\n" : "") + "edges = [" + edges + "]\n";
   for (std::size_t i = 0; i < game.players; ++i) {
+    if (part.is_elsewhere(i)) {
+      text += "[[player]]\nelsewhere = true\norder = " + std::to_string(game.order[i]) + '\n';
+      continue;
+    }
+    const bool external = part.is_external(i);
     std::string coupling;
     for (std::size_t j = 0; j < game.players; ++j) {
       if (game.coupling[i][j] == 0.0) continue;
@@ -248,12 +263,17 @@ inline std::string toml_of(const PlainGame& game) {
             (game.own_rbf ? "\nrbf = { centers = " + centers_of(i) + ", width = " + toml_of(game.width[i]) +
                                 ", W_max = " + toml_of(game.W_max[i]) + " }"
                           : "") +
-            (game.W0.empty() ? "" : "\nW0 = " + toml_of(game.W0[i])) + "\nx0 = " + toml_of(game.x0[i]) +
-            (game.order[i] == 1 ? "\nz0 = " : "\nv0 = ") + toml_of(game.reference0[i]) +
-            "\ny0 = " + toml_of(game.y0[i]) + "\ncost = { quadratic = " + toml_of(game.quadratic[i]) +
-            ", linear = " + toml_of(game.linear[i]) + ", constant = " + toml_of(game.constant[i]) + ", coupling = [" +
-            coupling + "] }\ndynamics = { linear = " + pairs_of(game.G[i]) + ", square = " + pairs_of(game.H[i]) +
-            " }\ndisturbance = { amplitude = " + toml_of(game.amplitude[i]) +
+            (game.W0.empty() ? "" : "\nW0 = " + toml_of(game.W0[i])) + "\ny0 = " + toml_of(game.y0[i]) +
+            "\ncost = { quadratic = " + toml_of(game.quadratic[i]) + ", linear = " + toml_of(game.linear[i]) +
+            ", constant = " + toml_of(game.constant[i]) + ", coupling = [" + coupling + "] }\n";
+    if (game.order[i] == 1) text += "z0 = " + toml_of(game.reference0[i]) + '\n';
+    if (external) {
+      text += "plant = \"external\"\n";
+      continue;
+    }
+    if (game.order[i] == 2) text += "v0 = " + toml_of(game.reference0[i]) + '\n';
+    text += "x0 = " + toml_of(game.x0[i]) + "\ndynamics = { linear = " + pairs_of(game.G[i]) +
+            ", square = " + pairs_of(game.H[i]) + " }\ndisturbance = { amplitude = " + toml_of(game.amplitude[i]) +
             ", frequency = " + toml_of(game.frequency[i]) + ", phase = " + toml_of(game.phase[i]) +
             ", bias = " + toml_of(game.bias[i]) + " }\n";
   }

@@ -31,8 +31,8 @@ struct Linearized {
         signals(loop.shape()),
         jacobian(loop),
         layer(loop) {
-    loop.evaluate_seeking(state.data(), signals);
-    jacobian.linearize(state.data(), signals, modes);
+    loop.evaluate_seeking(state.data(), nullptr, signals);
+    jacobian.linearize(state.data(), loop.plants(state.data(), nullptr, signals), signals, modes);
   }
   [[nodiscard]] std::size_t place(int p) const {
     const bool second = loop.shape().is_second_order(loop.shape().player_of(p));
@@ -59,7 +59,7 @@ struct Linearized {
   }
   [[nodiscard]] std::vector<Real> errors(const std::vector<Real>& at_state) const {
     Signals there(loop.shape());
-    loop.evaluate_errors(at_state.data(), there);
+    loop.evaluate_errors(at_state.data(), nullptr, there);
     return {there.error.begin(), there.error.end()};
   }
 
@@ -110,9 +110,9 @@ TEST(RobustLayer, TellsWhetherTheLinearizationHolds) {
         const Real delta = loop.game.delta[loop.player(p)];
         defect = std::max(defect, share * counted(missed, delta) * loop.heaviest(static_cast<int>(p), gamma, weight));
       }
-      loop.loop.evaluate_seeking(evaluated.data(), loop.signals);
+      loop.loop.evaluate_seeking(evaluated.data(), nullptr, loop.signals);
       const auto holds = [&](Real tolerance) {
-        return loop.layer.linearization_holds(loop.jacobian, loop.signals, state.data(), gamma, weight.data(),
+        return loop.layer.linearization_holds(loop.jacobian, loop.signals, state.data(), nullptr, gamma, weight.data(),
                                               tolerance);
       };
       EXPECT_TRUE(holds(1.0001 * defect + 1e-13)) << size;
@@ -144,15 +144,16 @@ TEST(RobustLayer, TellsSoForAnyStepInAStiffLayer) {
   };
   for (Real from = -3.0; from <= 3.0; from += 0.125) {
     const std::vector<Real> start = with_error(from * layer);
-    loop.loop.evaluate_seeking(start.data(), loop.signals);
-    loop.jacobian.linearize(start.data(), loop.signals, loop.modes);
+    loop.loop.evaluate_seeking(start.data(), nullptr, loop.signals);
+    loop.jacobian.linearize(start.data(), loop.loop.plants(start.data(), nullptr, loop.signals), loop.signals,
+                            loop.modes);
     for (Real to = -3.0; to <= 3.0; to += 0.125) {
       const std::vector<Real> state = with_error(to * layer);
       const Real defect = defect_of(loop, gamma, loop.heaviest(0, gamma, weight), from * layer, to * layer);
       if (defect < 1e-8) continue;
       for (const Real part : {0.5, 0.9, 0.999, 1.001}) {
-        EXPECT_EQ(loop.layer.linearization_holds(loop.jacobian, loop.signals, state.data(), gamma, weight.data(),
-                                                 part * defect),
+        EXPECT_EQ(loop.layer.linearization_holds(loop.jacobian, loop.signals, state.data(), nullptr, gamma,
+                                                 weight.data(), part * defect),
                   part > 1.0)
             << from << " " << to << " " << part;
       }
@@ -173,9 +174,9 @@ TEST(RobustLayer, StopsInTheMiddleWhatACorrectionCarriedAcross) {
   const auto choose = [](int p, Real a, Real b, Real c, Real d) { return std::array{a, b, c, d}[at(p % 4)]; };
   const std::vector<Real> from = with_errors([&](int p) { return choose(p, -5.0, 4.0, 0.0, 0.1); });
   const std::vector<Real> to = with_errors([&](int p) { return choose(p, -2.0, -0.5, 5.0, -0.1); });
-  loop.loop.evaluate_seeking(from.data(), loop.signals);
+  loop.loop.evaluate_seeking(from.data(), nullptr, loop.signals);
   std::vector<Real> stopped = to;
-  EXPECT_TRUE(loop.layer.stop_in_the_middle(loop.signals, stopped.data()));
+  EXPECT_TRUE(loop.layer.stop_in_the_middle(loop.signals, nullptr, stopped.data()));
   const std::vector<Real> errors = loop.errors(stopped);
   std::vector<Real> expected = to;
   for (int p = 1; p < 12; p += 4) {
@@ -184,9 +185,9 @@ TEST(RobustLayer, StopsInTheMiddleWhatACorrectionCarriedAcross) {
   }
   EXPECT_EQ(stopped, expected);
   // nothing was carried across
-  loop.loop.evaluate_seeking(stopped.data(), loop.signals);
+  loop.loop.evaluate_seeking(stopped.data(), nullptr, loop.signals);
   std::vector<Real> kept = to;
-  EXPECT_FALSE(loop.layer.stop_in_the_middle(loop.signals, kept.data()));
+  EXPECT_FALSE(loop.layer.stop_in_the_middle(loop.signals, nullptr, kept.data()));
   EXPECT_EQ(kept, to);
 }
 
@@ -195,8 +196,9 @@ TEST(RobustLayer, IsNotThereWithoutTheRobustTerm) {
   std::vector<Real> state = loop.state;
   const std::vector<Real> weight(state.size(), 1.0);
   const std::vector<Real> far = loop.near(state, 1e3);
-  EXPECT_TRUE(loop.layer.linearization_holds(loop.jacobian, loop.signals, far.data(), 1.0, weight.data(), 0.0));
-  EXPECT_FALSE(loop.layer.stop_in_the_middle(loop.signals, state.data()));
+  EXPECT_TRUE(
+      loop.layer.linearization_holds(loop.jacobian, loop.signals, far.data(), nullptr, 1.0, weight.data(), 0.0));
+  EXPECT_FALSE(loop.layer.stop_in_the_middle(loop.signals, nullptr, state.data()));
   EXPECT_EQ(state, loop.state);
 }
 

@@ -13,7 +13,7 @@ namespace {
 constexpr int entries = 11;
 
 SinusoidalDisturbance disturbance() {
-  SinusoidalDisturbance d(entries, 1);
+  SinusoidalDisturbance d({.players = entries, .dimension = 1, .order = {}});
   testing::RandomNumbers random(8);
   random.fill(d.coefficients[SinusoidalDisturbance::amplitude], -4.0, 4.0);
   random.fill(d.coefficients[SinusoidalDisturbance::frequency], 0.1, 9.0);
@@ -40,13 +40,13 @@ TEST(SinusoidalDisturbance, ValuesAreTheFormula) {
 
 // sin(1.3 (1.76e9 + t) + 0.4) for t = 0, 1/64 and 20 from exact fractions and 110 digits of pi
 TEST(SinusoidalDisturbance, CountsFromItsOrigin) {
-  SinusoidalDisturbance d(1, 1);
+  SinusoidalDisturbance d({.players = 1, .dimension = 1, .order = {}});
   d.coefficients[SinusoidalDisturbance::amplitude] = {1.0};
   d.coefficients[SinusoidalDisturbance::frequency] = {1.3};
   d.coefficients[SinusoidalDisturbance::phase] = {0.4};
   d.time_origin = 1.76e9;
   d.refresh();
-  SinusoidalDisturbance faster(1, 1);
+  SinusoidalDisturbance faster({.players = 1, .dimension = 1, .order = {}});
   faster.coefficients[SinusoidalDisturbance::frequency] = {1.0};
   const CoefficientsAlong still(d.coefficients, nullptr);
   const CoefficientsAlong moved(d.coefficients, &faster.coefficients);
@@ -96,11 +96,12 @@ TEST(SinusoidalDisturbance, DerivativesAlongTimeAndCoefficientsAreThoseOfTheValu
 }
 
 TEST(SinusoidalDisturbance, StartsAtZeroAndIsCopiedWhole) {
-  SinusoidalDisturbance d(2, 1);
+  SinusoidalDisturbance d({.players = 2, .dimension = 1, .order = {}});
   std::vector<Real> values(2, 99.0);
   d.values(3.0, values.data());
   EXPECT_EQ(values, std::vector<Real>(2, 0.0));
   d.coefficients[SinusoidalDisturbance::bias] = {1.0, -2.0};
+  d.refresh();
   const std::unique_ptr<Disturbance> clone = d.clone();
   d.coefficients[SinusoidalDisturbance::bias] = {5.0, 5.0};
   clone->values(3.0, values.data());

@@ -101,7 +101,7 @@ struct Outcome {
 
 Outcome run(const PlainGame& game, Real tolerance, Real end) {
   const ClosedLoop loop(parse_game(testing::toml_of(game)).parameters);
-  const ExternalDisturbance input(loop.shape().actions());
+  const Inputs input(loop.shape().actions());
   Integrator integrator(loop, input, std::make_unique<BoundedSolver>());
   std::vector<Real> norm2(at(loop.shape().actions()));
   Outcome outcome;

@@ -26,6 +26,7 @@ from .plot import plot
 from .report import report
 from .run import run
 from .schema import schema
+from .ssp import ssp
 from .sweep import sweep
 from .tune import tune
 from .validate import validate
@@ -77,7 +78,7 @@ def root(
 
 
 for command in (
-    build, info, run, validate, plot, demo, analyse, new, check, schema, report, compare, sweep, tune,
+    build, ssp, info, run, validate, plot, demo, analyse, new, check, schema, report, compare, sweep, tune,
 ):  # fmt: skip
     app.command()(command)
 

@@ -129,3 +129,11 @@ def names_option(texts: Iterable[str], hint: str) -> list[str]:
             raise typer.BadParameter(f"names separated by commas expected, not {text!r}", param_hint=hint)
         names += found
     return names
+
+
+def players_of_text(text: str, hint: str) -> list[int]:
+    """1-based players, as in 3 or 1,2. Raises typer.BadParameter."""
+    try:
+        return [int(each) for each in text.split(",")]
+    except ValueError:
+        raise typer.BadParameter(f"{text!r} is no list of players such as 1,2", param_hint=hint) from None

@@ -163,6 +163,11 @@ def _is_fmu(path: Path) -> bool:
         return {"modelDescription.xml", "resources/game.toml"} <= set(archive.namelist())
 
 
+def _is_structure(path: Path) -> bool:
+    with zipfile.ZipFile(path) as archive:
+        return "SystemStructure.ssd" in archive.namelist()
+
+
 def _is_result(path: Path) -> bool:
     if suffix_of(path) == ".parquet":
         import pyarrow as pa
@@ -197,6 +202,7 @@ def _is_json(key: str, value: Any = None) -> Callable[[Path], bool]:
 
 
 FMU = Kind("an FMU of a game", (".fmu",), _is_fmu)
+SSP = Kind("a system structure", (".ssp",), _is_structure)
 GAME = Kind("a game file", (".toml",), None)
 RESULT = Kind("a result", (".csv", ".parquet"), _is_result)
 DISTURBANCE = Kind("a table of d_ext", (".csv",), lambda path: _stems(path) == {"d_ext"})

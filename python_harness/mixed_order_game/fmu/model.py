@@ -83,8 +83,7 @@ class Model:
     @cached_property
     def order(self) -> tuple[int, ...]:
         """(N,), 1 velocity-driven, 2 acceleration-driven."""
-        entries = self.indexed("order")
-        return tuple(int(entries[(i,)].start or 0) for i in range(1, len(entries) + 1))
+        return tuple(int(player["order"]) for player in self.game["player"])
 
     @property
     def players(self) -> int:
@@ -94,7 +93,7 @@ class Model:
     @cached_property
     def dimension(self) -> int:
         """D."""
-        return max(index[1] for index in self.indexed("x"))
+        return max(index[1] for index in self.indexed("u"))
 
     @property
     def neurons(self) -> int:
@@ -109,7 +108,22 @@ class Model:
     @property
     def player_names(self) -> tuple[str, ...]:
         """(N,)."""
-        return tuple(str(player["name"]) for player in self.game["player"])
+        return tuple(
+            str(player.get("name", f"player {number}"))
+            for number, player in enumerate(self.game["player"], 1)
+        )
+
+    @property
+    def elsewhere(self) -> tuple[int, ...]:
+        """1-based numbers of the players that are in other FMUs."""
+        return tuple(n for n, player in enumerate(self.game["player"], 1) if player.get("elsewhere"))
+
+    @property
+    def external(self) -> tuple[int, ...]:
+        """1-based numbers of the players whose plants are outside."""
+        return tuple(
+            n for n, player in enumerate(self.game["player"], 1) if player.get("plant") == "external"
+        )
 
     @cached_property
     def expressions(self) -> Mapping[str, Sequence[int]]:

@@ -72,7 +72,7 @@ def write_fmu(
     if icon is not None:
         add("model.png", icon)
 
-    _write_archive(output, entries)
+    write_archive(output, entries)
     return output
 
 
@@ -93,7 +93,7 @@ def _tree(folder: Path, name: str) -> Iterable[tuple[str, Path]]:
             yield relative.as_posix(), source
 
 
-def _write_archive(output: Path, entries: Mapping[str, Path]) -> None:
+def write_archive(output: Path, entries: Mapping[str, Path]) -> None:
     """Write to a temporary file in the same folder, then rename: readers see the old file or the new one."""
     output.parent.mkdir(parents=True, exist_ok=True)
     handle, name = tempfile.mkstemp(prefix=f".{output.name}.", suffix=".part", dir=output.parent)

@@ -1,24 +1,24 @@
-#include "external_disturbance.hpp"
+#include "loop/inputs.hpp"
 
 #include <gtest/gtest.h>
 
 namespace mixed_order_game {
 namespace {
 
-Real value_at(const ExternalDisturbance& d, Real t, int entry = 1) {
-  std::vector<Real> values(at(d.entries()));
+Real value_at(const Inputs& d, Real t, int entry = 1) {
+  std::vector<Real> values(at(d.count()));
   d.values(t, values.data());
   return values[at(entry)];
 }
 
-Real rate_at(const ExternalDisturbance& d, Real t, int entry = 1) {
-  std::vector<Real> rates(at(d.entries()));
+Real rate_at(const Inputs& d, Real t, int entry = 1) {
+  std::vector<Real> rates(at(d.count()));
   d.rates(t, rates.data());
   return rates[at(entry)];
 }
 
-ExternalDisturbance cubic() {
-  ExternalDisturbance d(3);
+Inputs cubic() {
+  Inputs d(3);
   d.set_value(1, 4.0);
   d.set_derivative(1, 1, -3.0, 10.0);
   d.set_derivative(1, 2, 2.0, 10.0);
@@ -26,17 +26,17 @@ ExternalDisturbance cubic() {
   return d;
 }
 
-TEST(ExternalDisturbance, IsZeroAtFirst) {
-  const ExternalDisturbance d(3);
-  EXPECT_EQ(d.entries(), 3);
+TEST(Inputs, IsZeroAtFirst) {
+  const Inputs d(3);
+  EXPECT_EQ(d.count(), 3);
   for (int entry = 0; entry < 3; ++entry) {
     EXPECT_EQ(value_at(d, 5.0, entry), 0.0);
     EXPECT_EQ(rate_at(d, 5.0, entry), 0.0);
   }
 }
 
-TEST(ExternalDisturbance, IsTheTaylorPolynomialOfItsDerivatives) {
-  const ExternalDisturbance d = cubic();
+TEST(Inputs, IsTheTaylorPolynomialOfItsDerivatives) {
+  const Inputs d = cubic();
   for (const Real h : {0.0, 0.5, 2.0, -1.0}) {
     EXPECT_DOUBLE_EQ(value_at(d, 10.0 + h), 4.0 - 3.0 * h + h * h + h * h * h);
     EXPECT_DOUBLE_EQ(rate_at(d, 10.0 + h), -3.0 + 2.0 * h + 3.0 * h * h);
@@ -46,18 +46,18 @@ TEST(ExternalDisturbance, IsTheTaylorPolynomialOfItsDerivatives) {
   EXPECT_EQ(value_at(d, 12.0, 2), 0.0);
 }
 
-TEST(ExternalDisturbance, ANewValueRemovesTheDerivatives) {
-  ExternalDisturbance d = cubic();
+TEST(Inputs, ANewValueRemovesTheDerivatives) {
+  Inputs d = cubic();
   d.set_value(1, -1.5);
   EXPECT_EQ(value_at(d, 100.0), -1.5);
   EXPECT_EQ(rate_at(d, 100.0), 0.0);
 }
 
-TEST(ExternalDisturbance, IsSavedAndRestoredWhole) {
-  const ExternalDisturbance d = cubic();
+TEST(Inputs, IsSavedAndRestoredWhole) {
+  const Inputs d = cubic();
   const std::vector<Real> saved(d.numbers().begin(), d.numbers().end());
-  EXPECT_EQ(saved.size(), at(3 * (ExternalDisturbance::highest_derivative + 2)));
-  ExternalDisturbance other(3);
+  EXPECT_EQ(saved.size(), at(3 * (Inputs::highest_derivative + 2)));
+  Inputs other(3);
   other.set_value(0, 7.0);
   other.set_numbers(saved);
   EXPECT_EQ(value_at(other, 11.5), value_at(d, 11.5));
