@@ -58,16 +58,16 @@ struct Kernels {
   // closed loop; n = N D entries in a row of estimates, one row for each of the H hosted players
   /// S_m(y_i) for centres c_m (1, ..., 1) at m * H + h: activation[m * H D + own entry], equal for every coordinate;
   /// sharpness is 1 / rho_i^2. exponent is scratch of H (q + 2) + 8 numbers.
-  void (*activations_diagonal)(int rows, int n, int dimension, int neurons, const double* centers, const double* sharpness,
-                               const double* y, double* exponent, double* activation);
+  void (*activations_diagonal)(int rows, int n, int dimension, int neurons, const double* centers,
+                               const double* sharpness, const double* y, double* exponent, double* activation);
   /// The same for centres that are vectors, `owners` of each m: centre m of row h is the row m * owners + h of n
   /// numbers, or row m of all players when there is one.
   void (*activations_general)(int rows, int n, int dimension, int neurons, int owners, const double* centers,
                               const double* sharpness, const double* y, double* exponent, double* activation);
   /// y_ij' = -k3_i (sum_k a_ik (y_ij - y_kj) + a_ij (y_ij - xbar_j)), with the k of the graph among the rows and the j
   /// that are seen among all players.
-  void (*estimate_rates)(int rows, int players, int dimension, NeighbourRows graph, NeighbourRows seen, const double* k3,
-                         const double* y, const double* xbar, double* rate);
+  void (*estimate_rates)(int rows, int players, int dimension, NeighbourRows graph, NeighbourRows seen,
+                         const double* k3, const double* y, const double* xbar, double* rate);
   /// sum[p] = sum over m of a[m * n + p] * b[m * n + p]
   void (*column_products)(int n, int rows, const double* a, const double* b, double* sum);
   /// W' = beta e (S - radial W), row by row; radial[p] is 0 inside and w'S / W_max on the sphere.

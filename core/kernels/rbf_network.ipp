@@ -17,8 +17,8 @@ inline void exponentiate_and_repeat(int rows, int dimension, int neurons, double
   });
 }
 
-void activations_diagonal(int rows, int n, int dimension, int neurons, const double* centers,
-                          const double* sharpness, const double* y, double* exponent, double* activation) {
+void activations_diagonal(int rows, int n, int dimension, int neurons, const double* centers, const double* sharpness,
+                          const double* y, double* exponent, double* activation) {
   const double count = n;
   double* sum = exponent + rows * neurons + vector_length;
   double* squares = sum + rows;

@@ -101,7 +101,10 @@ x0 = [-1.0, 2.0]
 cost = { quadratic = 1.0, coupling = [[1, 0.5]] }
 """
 )
-GAMES = {"coefficients": GAME, "own gains": OWN_GAINS, "expressions": EXPRESSIONS}
+DIRECTED = GAME.replace(
+    "edges = [[1, 2], [2, 3, 0.5]]", "directed = true\nedges = [[1, 2], [2, 3, 0.5], [3, 1]]"
+)
+GAMES = {"coefficients": GAME, "own gains": OWN_GAINS, "expressions": EXPRESSIONS, "directed": DIRECTED}
 
 
 def written(folder: Path, text: str) -> Path:

@@ -1,7 +1,7 @@
 """What the command prints: tables of a model, a result and a verdict, on stdout."""
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from itertools import groupby
 from typing import Any
@@ -13,6 +13,7 @@ from rich.text import Text
 
 from ..errors import ResultError
 from ..fmu.model import Model, provenance
+from ..fmu.parts import longest_sampled_step
 from ..game.definition import PARTS, NamedParameter, named_parameters
 from ..results.result import Result
 from ..studies.validate import Validation, Verdict
@@ -33,8 +34,8 @@ def print_info(model: Model, *, variables: bool = False) -> None:
     edges = ", ".join(f"{i}{sign}{j}" + (f" ({w:g})" if w != 1.0 else "") for i, j, w in model.edges)
     grid.add_row("graph", Text(edges))
     grid.add_row("gains", ", ".join(f"{name} = {value:g}" for name, value in model.gains.items()))
-    for part, numbers in model.expressions.items():
-        grid.add_row("expressions", f"{PARTS[part]} of {_counted(numbers, model.players)}")
+    for name, told in _particulars(model):
+        grid.add_row(name, told)
     grid.add_row("experiment", f"{model.stop_time:g} s, step {model.step:g} s, tolerance {model.tolerance:g}")
     counts = ", ".join(f"{count} {kind}" for kind, count in data["variable_counts"].items())
     grid.add_row("variables", counts)
@@ -75,6 +76,16 @@ def print_info(model: Model, *, variables: bool = False) -> None:
             cells = (entry.name, entry.causality, entry.variability, start, limits, entry.unit or "")
             table.add_row(*map(Text, cells), Text(entry.description))
         show(table, console)
+
+
+def _particulars(model: Model) -> Iterator[tuple[str, str]]:
+    """What not every FMU has: expressions, and what it waits for."""
+    for part, numbers in model.expressions.items():
+        yield "expressions", f"{PARTS[part]} of {_counted(numbers, model.players)}"
+    if model.elsewhere:
+        yield "elsewhere", f"players {', '.join(map(str, model.elsewhere))}"
+    for number, step in longest_sampled_step(model).items():
+        yield "external plant", f"of player {number}: communication steps below {step:.2g} s"
 
 
 def info_data(model: Model, *, variables: bool = False) -> dict[str, Any]:

@@ -125,6 +125,19 @@ class Model:
             n for n, player in enumerate(self.game["player"], 1) if player.get("plant") == "external"
         )
 
+    def require_whole(self) -> None:
+        """Raises ModelError for an FMU that waits for players or plants outside."""
+        if self.elsewhere:
+            raise ModelError(
+                f"{self.path} holds a part of a game: player {self.elsewhere[0]} is elsewhere; "
+                "mog ssp connects the parts"
+            )
+        if self.external:
+            raise ModelError(
+                f"{self.path} waits for the plant of player {self.external[0]}, which is external: "
+                "connect it in a tool"
+            )
+
     @cached_property
     def expressions(self) -> Mapping[str, Sequence[int]]:
         """1-based numbers of the players whose cost, dynamics or disturbance has an expression; by part."""

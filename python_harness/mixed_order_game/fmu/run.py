@@ -101,6 +101,7 @@ class Simulator:
 
     def __init__(self, fmu: Path | str | None = None) -> None:
         self.model: Model = read_model(fmu)
+        self.model.require_whole()
         self._messages: list[tuple[int, str]] = []
         self._turn = Turn()
         self._process = os.getpid()

@@ -1,7 +1,7 @@
 """A game file for some of a game's players: what their FMU carries, and nothing of the others.
 
-Of the players elsewhere it says their orders alone. It keeps the edges along which its own players hear and the
-named parameters that their texts use.
+Of the players elsewhere it says their orders alone. It keeps the edges along which its own players hear and
+the named parameters that their texts use.
 """
 
 import json

@@ -124,6 +124,8 @@ def _require_alike(tables: Table) -> None:
         ("gains", "the same gains for all players", "has gains of its own"),
         ("rbf", "the same network for all players", "has a network of its own"),
         ("W0", "initial weights of 0", "has others"),
+        ("elsewhere", "whole games", "is elsewhere"),
+        ("plant", "plants inside the loop", "has an external one"),
     ):
         own = [i for i, player in enumerate(tables["player"], start=1) if player.get(key)]
         if own:
