@@ -344,6 +344,25 @@ def test_an_external_plant_is_driven_as_by_the_oracle(
         assert np.abs(found[each] - run.x[:, i, c]).max() < 1e-5
 
 
+def test_a_part_moves_as_by_the_oracle(tmp_path: Path) -> None:
+    """Player 1 alone, told what the oracle's run has of the others, moves as in that run."""
+    times = np.arange(0.0, 1.005, 0.01)
+    run = simulate(game_from_table(tomllib.loads(GAME)), times, rtol=1e-9, atol=1e-10)
+    signals = {f"x[3,{c + 1}]": run.x[:, 2, c] for c in range(2)}
+    signals |= {f"xbar[2,{c + 1}]": run.x[:, 1, c] for c in range(2)}  # of order 2
+    signals |= {f"y[2,{j + 1},{c + 1}]": run.y[:, 1, j, c] for j in range(3) for c in range(2)}
+    fmu = build_part(written(tmp_path, GAME), [1], tmp_path / "part.fmu")
+    expected = {f"x[1,{c + 1}]": run.x[:, 0, c] for c in range(2)}
+    expected |= {f"u[1,{c + 1}]": run.u[:, 0, c] for c in range(2)}
+    expected |= {f"xbar[1,{c + 1}]": run.z[:, 0, c] for c in range(2)}
+    expected |= {f"y[1,{j + 1},{c + 1}]": run.y[:, 0, j, c] for j in range(3) for c in range(2)}
+    found = driven(fmu, times, signals, list(expected))
+    for name, values in expected.items():
+        scale = max(1.0, float(np.abs(values).max()))
+        assert np.abs(found[name] - values).max() < 2e-3 * scale, name
+        assert np.abs(found[name][-1] - values[-1]) < 1e-5 * scale, name
+
+
 def driven(
     fmu: Path, times: Floats, signals: Mapping[str, Floats], names: Sequence[str]
 ) -> dict[str, Floats]:
