@@ -208,6 +208,32 @@ def rivalling_pairs() -> Functions:
     return Functions(costs, dynamics, disturbances)
 
 
+def underwater_vehicles() -> Functions:
+    p = np.array([(2.0, 1.0, -1.0), (-2.0, 1.5, -2.0), (-1.0, -2.0, -3.0), (1.5, -1.5, 0.0)])
+
+    def costs(x: Numbers) -> Numbers:
+        here, middle = own(x), x.mean(axis=-2)
+        near = np.sum((here - p) ** 2 + 1.5 * (here - middle) ** 2, axis=-1)
+        return np.asarray(near + 0.05 * (here[..., 2] - p[:, 2]) ** 4)
+
+    def dynamics(x: Numbers, v: Numbers) -> Numbers:
+        currents = (
+            0.5 * np.sin(x[:, 1]),
+            0.2 * x[:, 0] * x[:, 2],
+            0.4 * np.sin(x[:, 2]) * np.roll(x[:, 0], -1),
+        )
+        speed = np.sqrt(np.sum(v**2, axis=1, keepdims=True) + 0.05**2)
+        g = np.stack(currents, axis=1) - 0.4 * v * speed
+        g[3] = 0.3 * np.sin(x[3]) + 0.1 * x[0]
+        return np.asarray(g)
+
+    def disturbances(t: float) -> Numbers:
+        i, coordinate = np.arange(1, 5)[:, np.newaxis], np.arange(1, 4)
+        return np.asarray((1.0 + 0.2 * i) * np.sin((0.5 + 0.2 * coordinate) * t + i))
+
+    return Functions(costs, dynamics, disturbances)
+
+
 def two_hundred_households() -> Functions:
     """Wishes and weights are numbers that were drawn: those of the file."""
     given = tomllib.loads((GAMES / "two_hundred_households.toml").read_text(encoding="utf-8"))["parameters"]
@@ -238,6 +264,7 @@ BY_HAND: dict[str, Callable[[], Functions]] = {
         energy_peak_price,
         source_seeking,
         rivalling_pairs,
+        underwater_vehicles,
         two_hundred_households,
     )
 }
