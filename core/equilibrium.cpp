@@ -246,8 +246,9 @@ void require_best_responses(const SparseRows& pattern, const std::vector<Real>& 
     if (smallest >= -rounding * scale) continue;
     const std::string number = std::to_string(i + 1);
     throw GameError("player[" + number + "].cost is concave in the player's own action (second derivative " +
-                    text_of(smallest) + "), expected one of at least 0: where all gradients vanish, player " + number +
-                    " can lower its cost, and that is no Nash equilibrium");
+                        text_of(smallest) + "), expected one of at least 0: where all gradients vanish, player " +
+                        number + " can lower its cost, and that is no Nash equilibrium",
+                    "player[" + number + "].cost");
   }
 }
 

@@ -49,7 +49,8 @@ void refuse_endless_keys(std::string_view text) {
     } else if (c == '.') {
       if (++dots > most_dots) {
         throw GameError("line " + std::to_string(line) + " of the game definition has a key of more than " +
-                        std::to_string(most_dots) + " dots, expected the keys of a game");
+                            std::to_string(most_dots) + " dots, expected the keys of a game",
+                        {}, line, 1);
       }
     } else if (c == '\n' || c == '=' || c == ',' || c == '[' || c == ']' || c == '{' || c == '}') {
       dots = 0;
@@ -128,7 +129,8 @@ toml::table parse_toml(std::string_view text) {
   } catch (const toml::parse_error& error) {
     const toml::source_position where = error.source().begin;
     throw GameError("line " + in_digits(where.line) + ", column " + in_digits(where.column) +
-                    " of the game definition is not TOML: " + std::string(error.description()));
+                        " of the game definition is not TOML: " + std::string(error.description()),
+                    {}, where.line, where.column);
   }
 }
 
@@ -149,8 +151,9 @@ void TomlEntry::accept_keys(std::span<const std::string_view> known) const {
       for (const std::string_view other : known)
         expected += (expected.empty() ? "expected one of " : ", ") + std::string(other);
     }
-    throw GameError("\"" + shown + "\" is an unknown key of " + (path_.empty() ? "the game definition" : path_) + ", " +
-                    expected);
+    throw GameError(
+        "\"" + shown + "\" is an unknown key of " + (path_.empty() ? "the game definition" : path_) + ", " + expected,
+        path_.empty() ? std::string(name) : path_ + '.' + std::string(name));
   }
 }
 
@@ -270,7 +273,8 @@ void TomlEntry::numbers(int count, int stride, Real* to) const {
 }
 
 void TomlEntry::fail(std::string_view expected) const {
-  throw GameError(path_ + " is " + (present() ? value_of(*node_) : "missing") + ", expected " + std::string(expected));
+  throw GameError(path_ + " is " + (present() ? value_of(*node_) : "missing") + ", expected " + std::string(expected),
+                  path_);
 }
 
 }  // namespace mixed_order_game

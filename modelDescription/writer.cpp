@@ -9,6 +9,7 @@
 #include <string>
 
 #include "errors.hpp"
+#include "game_check.hpp"
 #include "model_description.hpp"
 #include "reference_results.hpp"
 #include "resource_location.hpp"
@@ -24,7 +25,7 @@ constexpr const char* usage =
     "\n"
     "  -o, --output FILE   write to FILE, which is replaced only when all went well\n"
     "  -e, --extra FOLDER  write reference results below FOLDER, unless the run is long or fails\n"
-    "  -c, --check         only check the game\n"
+    "  -c, --check         only check the game: what is wrong with it, and where, in JSON on standard output\n"
     "  -h, --help          show this text\n"
     "\n"
     "Exit code: 0 fine, 1 the game is not valid or a file cannot be read or written, 2 wrong usage.\n";
@@ -54,6 +55,17 @@ void write_reference_results(const Model& model, const std::string& extra) {
   for (const auto& [name, content] : reference_results(model)) {
     std::filesystem::create_directories(folder);
     write_whole((folder / name).string(), content);
+  }
+}
+
+Exit check(const std::string& toml) {
+  try {
+    const Model model(toml);
+    std::cout << checked_game(toml, nullptr);
+    return fine;
+  } catch (const GameError& error) {
+    std::cout << checked_game(toml, &error);
+    return failure;
   }
 }
 
@@ -100,8 +112,8 @@ int main(int argc, char** argv) {
       std::cerr << error.what() << '\n';
       return failure;
     }
+    if (check_only) return check(toml);
     const Model model(toml);
-    if (check_only) return fine;
     const std::string xml = model_description(model);
     if (!output.empty()) {
       write_whole(output, xml);

@@ -87,8 +87,9 @@ void ExpressionReader::unroll_into(const TomlEntry& entry, const Place& place, E
     node = unroll(parse_expression(text), place, graph);
   } catch (const ExpressionError& error) {
     const auto [line, column] = entry.place_of(document_, error.position);
-    throw GameError(entry.path() + ", line " + std::to_string(line) + ", column " + std::to_string(column) + ": " +
-                    error.what());
+    throw GameError(
+        entry.path() + ", line " + std::to_string(line) + ", column " + std::to_string(column) + ": " + error.what(),
+        entry.path(), line, column);
   }
 }
 

@@ -246,7 +246,7 @@ class ModelVariables::Builder {
     for (const NamedParameter& named : game_.parameters.named.declared) {
       if (named.fixed) continue;
       if (table_.find(named.name) != nullptr) {
-        throw GameError("parameters." + named.name + " has the name of a variable, expected another name");
+        refuse_name(named.name);
       }
       Family family = parameter(named.name.c_str(), named.description.c_str(), Variability::tunable);
       family.declared_unit = named.unit;
@@ -270,6 +270,10 @@ class ModelVariables::Builder {
       add(std::move(family), elements);
     }
   }
+  [[noreturn]] static void refuse_name(const std::string& name) {
+    const std::string entry = "parameters." + name;
+    throw GameError(entry + " has the name of a variable, expected another name", entry);
+  }
   // A named parameter may have come before a variable of its name.
   void require_distinct_names() const {
     std::set<std::string_view> seen;
@@ -278,7 +282,7 @@ class ModelVariables::Builder {
     }
     for (const Family& family : table_.families()) {
       if (!family.is_named || !seen.contains(family.name)) continue;
-      throw GameError("parameters." + family.name + " has the name of a variable, expected another name");
+      refuse_name(family.name);
     }
   }
   Elements elements(Indices indices, bool of_plants, const std::vector<Real>& values) const {

@@ -12,9 +12,8 @@ from typer.testing import CliRunner, Result
 from mixed_order_game import GameError, default_game
 from mixed_order_game.cli.app import app
 from mixed_order_game.fmu.build import build_fmu
-from mixed_order_game.game.check import check_game
+from mixed_order_game.game.check import _judged, _place, check_game
 from mixed_order_game.game.new import Recipe, new_game
-from mixed_order_game.game.positions import Positions
 from mixed_order_game.theory.analysis import analyse
 from mixed_order_game.theory.game import read_game
 from mixed_order_game.theory.spectrum import nash_equilibrium
@@ -212,8 +211,9 @@ def test_costs_in_different_units(tmp_path: Path) -> None:
     np.testing.assert_allclose(nash_equilibrium(read_game(path).parameters), -0.5, rtol=1e-14)
 
 
-def test_positions() -> None:
-    positions = Positions(
+def test_places(tmp_path: Path) -> None:
+    path = written(
+        tmp_path,
         'title = "x"\n'  # 1
         'a."b c".d = 1\n'  # 2
         "[gains]\n"  # 3
@@ -226,30 +226,31 @@ def test_positions() -> None:
         "[[player]]\n"  # 11
         "# only a comment\n"  # 12
         "[player.cost]\n"  # 13
-        "linear.x = 4\n"  # 14
+        "linear.x = 4\n",  # 14
     )
-    lines = {
-        (): 1,
-        ("title",): 1,
-        ("a", "b c", "d"): 2,
-        ("a", "b c"): 2,
-        ("gains",): 3,
-        ("gains", "k1"): 4,
-        ("gains", "k2"): 3,
-        ("player",): 5,
-        ("player", 0): 5,
-        ("player", 0, "name"): 6,
-        ("player", 0, "cost", "quadratic"): 8,
-        ("player", 0, "cost", "coupling", 0, 1): 8,
-        ("player", 0, "cost", "coupling", 1): 9,
-        ("player", 0, "cost", "coupling", 1, 1): 10,
-        ("player", 1): 11,
-        ("player", 1, "order"): 11,
-        ("player", 1, "cost"): 13,
-        ("player", 1, "cost", "linear", "x"): 14,
-        ("nothing", "at", 7, "all"): 1,
+    places = {
+        (): (1, 1),
+        ("title",): (1, 1),
+        ("a", "b c", "d"): (2, 9),
+        ("a", "b c"): (2, 3),
+        ("gains",): (3, 2),
+        ("gains", "k1"): (4, 1),
+        ("gains", "k2"): (3, 2),
+        ("player",): (5, 3),
+        ("player", 0): (5, 1),
+        ("player", 0, "name"): (6, 1),
+        ("player", 0, "cost", "quadratic"): (8, 10),
+        ("player", 0, "cost", "coupling", 0, 1): (8, 41),
+        ("player", 0, "cost", "coupling", 1): (9, 3),
+        ("player", 0, "cost", "coupling", 1, 1): (10, 3),
+        ("player", 1): (11, 1),
+        ("player", 1, "order"): (11, 1),
+        ("player", 1, "cost"): (13, 9),
+        ("player", 1, "cost", "linear", "x"): (14, 8),
+        ("nothing", "at", 7, "all"): (1, 1),
     }
-    assert {path: positions.line(path) for path in lines} == lines
+    found = _judged(path)["places"]
+    assert {entry: _place(entry, found) for entry in places} == places
 
 
 @settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
@@ -275,7 +276,7 @@ def test_command(tmp_path: Path) -> None:
     bad = mog("check", default_game(), path)
     assert bad.exit_code == 1
     lines = bad.stderr.splitlines()
-    assert lines[1] == f"{path}:4: gains.k4 is missing, expected a positive number"
+    assert lines[1] == f"{path}:4:2: gains.k4 is missing, expected a positive number"
     assert len(lines) == len(TOLD)
     missing = mog("check", tmp_path / "none.toml")
     assert (missing.exit_code, missing.stderr) == (

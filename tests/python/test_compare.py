@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from mixed_order_game import ResultError, VariableError, run
-from mixed_order_game.results.metrics import METRIC_UNITS, metrics
+from mixed_order_game.results.metrics import METRIC_UNITS
 from mixed_order_game.studies.compare import (
     AS_IT_IS,
     CompareError,
@@ -75,7 +75,7 @@ def test_results_from_files(fmu: Path, tmp_path: Path) -> None:
     results = load_results([first, second])
     found = compare_results(results)
     assert [each.label for each in found.runs] == ["first", "second"]
-    assert found["first"].metrics == metrics(results["first"])
+    assert found["first"].metrics == results["first"].metrics
     (tmp_path / "other").mkdir()
     third = run(fmu, stop_time=0.1).save(tmp_path / "other" / "first.parquet")
     assert list(load_results([first, third])) == [str(first), str(third)]

@@ -8,11 +8,8 @@ import pytest
 
 from mixed_order_game import ResultError, Simulator, read_model, run
 from mixed_order_game.results.metrics import (
-    changed_values,
     control_energy,
-    metrics,
     overshoot,
-    provenance,
     sample_times,
     sampled_metrics,
     settling_time,
@@ -79,21 +76,21 @@ def test_windows() -> None:
 
 def test_of_a_result(fmu: Path) -> None:
     result = run(fmu)
-    found = metrics(result)
+    found = result.metrics
     assert 0.3 < found.settling_time < 1.0
     settled = np.abs(result.x - result.x_star).max(axis=(1, 2)) <= found.band
     assert settled[result.time > found.settling_time].all()
     assert found.final_error == result.largest_error(16.0)
     assert found.events == result["solver_events"][-1] > 0.0
     assert found.control_peak == pytest.approx(np.abs(result.u).max())
-    without_u = metrics(run(fmu, outputs=["x"], stop_time=1.0))
+    without_u = run(fmu, outputs=["x"], stop_time=1.0).metrics
     assert np.isnan([without_u.control_energy, without_u.events]).all()
 
 
 def test_equilibrium_that_moves(fmu: Path) -> None:
     changes = {5.0: {f"cost_linear[{i},1]": 0.0 for i in range(1, 6)}}
     result = run(fmu, stop_time=10.0, changes=changes, outputs=["x", "x_star"])
-    assert 5.0 < metrics(result).settling_time < 7.0
+    assert 5.0 < result.metrics.settling_time < 7.0
 
 
 def test_sampler_equals_the_simulator(fmu: Path) -> None:
@@ -104,10 +101,10 @@ def test_sampler_equals_the_simulator(fmu: Path) -> None:
         recorded = sampler.record(values, settings)
         other = sampler.measure({}, settings)
         result = simulator.run(start_values=values, stop_time=3.0)
-    assert first == again == metrics(recorded)
+    assert first == again == recorded.metrics
     assert first != other
-    assert first.final_error == pytest.approx(metrics(result).final_error, rel=1e-4)
-    assert first.settling_time == pytest.approx(metrics(result).settling_time, rel=1e-3)
+    assert first.final_error == pytest.approx(result.metrics.final_error, rel=1e-4)
+    assert first.settling_time == pytest.approx(result.metrics.settling_time, rel=1e-3)
     regular = np.isin(np.round(recorded.time, 9), np.round(result.time, 9))
     np.testing.assert_allclose(recorded.x[regular], result.x, atol=1e-5)
     assert recorded.parameters == result.parameters
@@ -132,12 +129,7 @@ def test_settings_that_make_no_sense(wrong: dict[str, float]) -> None:
         Settings(**wrong)  # type: ignore[arg-type]
 
 
-def test_provenance(fmu: Path) -> None:
+def test_changed_values(fmu: Path) -> None:
     result = run(fmu, start_values={"k1": 12.0, "k2": 1.0, "perturbed": False}, stop_time=0.1)
-    model = read_model(fmu)
-    origin = provenance(model, result.parameters, seed=5)
-    assert origin.changed == {"k1": 12.0, "perturbed": False}
-    assert origin.guid == model.guid
-    assert origin.package_version == result.package_version
-    assert json.loads(json.dumps(origin.as_json()))["seed"] == 5
-    assert changed_values(model, {"x0[1,1]": -5.0, "x0[1,2]": 7.0}) == {"x0[1,2]": 7.0}
+    assert result.changed == {"k1": 12.0, "perturbed": False}
+    assert read_model(fmu).changed_values({"x0[1,1]": -5.0, "x0[1,2]": 7.0}) == {"x0[1,2]": 7.0}

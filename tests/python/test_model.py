@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from mixed_order_game import ModelError, VariableError, build_fmu, default_game, read_model
-from mixed_order_game.fmu.model import check_value, provenance
+from mixed_order_game.fmu.model import check_value, sources
 from mixed_order_game.game.check import check_game
 from mixed_order_game.theory.game import read_game
 from tests.conftest import FmuOf
@@ -26,13 +26,13 @@ def test_paper_example(fmu: Path) -> None:
     assert len(model.guid) > 10
 
 
-def test_provenance_of_the_paper_example_only(fmu: Path, fmu_of: FmuOf) -> None:
-    sources = {name: entry.source for entry in provenance(read_model(fmu)) for name in entry.names}
+def test_sources_of_the_paper_example_only(fmu: Path, fmu_of: FmuOf) -> None:
+    told = {name: entry.source for entry in sources(read_model(fmu)) for name in entry.names}
     for name in ("cost_quadratic", "rho", "W_max", "beta", "delta", "epsilon", "x0", "v0"):
-        assert sources[name] == "the paper's"
+        assert told[name] == "the paper's"
     for name in ("k1", "k2", "k3", "k4", "a", "z0", "y0"):
-        assert sources[name].startswith("ours")
-    assert provenance(read_model(fmu_of("interleaved_orders"))) == ()
+        assert told[name].startswith("ours")
+    assert sources(read_model(fmu_of("interleaved_orders"))) == ()
     assert read_model(fmu_of("five_vehicles_plain")).is_paper_example
 
 

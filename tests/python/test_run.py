@@ -22,7 +22,6 @@ from mixed_order_game.fmu.build import shipped_game
 from mixed_order_game.fmu.model import Value
 from mixed_order_game.fmu.schedule import read_disturbance, read_graph_schedule
 from mixed_order_game.names import parse_name
-from mixed_order_game.results.metrics import metrics
 from tests.conftest import FmuOf
 
 OUTPUTS = ("x", "x_star", "nash_error")
@@ -161,7 +160,7 @@ def test_files_and_figures_of_a_run_from_unix_time(simulator: Simulator, tmp_pat
     late, moved = case(UNIX), case(0.0)
     np.testing.assert_array_equal(late.x, moved.x)
     assert late.metrics == moved.metrics
-    assert metrics(late, settle_time=UNIX + 1.75) == metrics(moved, settle_time=1.75)
+    assert late.measured(settle_time=UNIX + 1.75) == moved.measured(settle_time=1.75)
     assert late.largest_error(UNIX + 1.5, UNIX + 2.0) == moved.largest_error(1.5, 2.0)
     assert late.window(UNIX + 1.0, UNIX + 1.25).sum() == 17
     assert "1760000000 to 1760000002 s" in repr(late)

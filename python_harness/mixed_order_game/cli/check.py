@@ -25,7 +25,7 @@ def check(
             broken = True
             continue
         for problem in problems:
-            typer.echo(f"{game}:{problem.line}: {problem.sentence}", err=True)
+            typer.echo(f"{game}:{problem.line}:{problem.column}: {problem.sentence}", err=True)
         if not problems:
             typer.echo(f"{game} is valid")
         broken = broken or bool(problems)

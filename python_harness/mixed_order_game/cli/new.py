@@ -51,5 +51,5 @@ def new(
     write_file(output, GAME, lambda file: file.write(text.encode()), force=force)
     problems = check_game(output)
     if problems:
-        raise GameError(f"{output}:{problems[0].line}: {problems[0].sentence}")
+        raise GameError(f"{output}:{problems[0].line}:{problems[0].column}: {problems[0].sentence}")
     typer.echo(output)

@@ -12,7 +12,7 @@ from rich.table import Table
 from rich.text import Text
 
 from ..errors import ResultError
-from ..fmu.model import Model, provenance
+from ..fmu.model import Model, sources
 from ..fmu.parts import longest_sampled_step
 from ..game.definition import PARTS, NamedParameter, named_parameters
 from ..results.result import Result
@@ -55,10 +55,10 @@ def print_info(model: Model, *, variables: bool = False) -> None:
             table.add_row(*map(Text, row))
         show(table, console)
 
-    sources = provenance(model)
-    if sources:
+    told = sources(model)
+    if told:
         table = Table("values", "variables", "source", box=LINES)
-        for source in sources:
+        for source in told:
             table.add_row(source.group, ", ".join(source.names), source.source)
         show(table, console)
 
@@ -111,7 +111,7 @@ def info_data(model: Model, *, variables: bool = False) -> dict[str, Any]:
         "paper_example": model.is_paper_example,
         "sources": [
             {"group": source.group, "variables": list(source.names), "source": source.source}
-            for source in provenance(model)
+            for source in sources(model)
         ],
         "variable_counts": dict(Counter(variable.causality for variable in model.variables.values())),
         "capabilities": {kind: dict(flags) for kind, flags in model.capabilities.items()},

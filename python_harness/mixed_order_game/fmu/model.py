@@ -252,6 +252,10 @@ class Model:
             values[name] = check_value(self.variable(name), value)
         return values
 
+    def changed_values(self, values: Mapping[str, Value]) -> dict[str, Value]:
+        """Those of the parameters and inputs that differ from the model's own start values."""
+        return {name: value for name, value in values.items() if self.variable(name).start != value}
+
 
 def _range_of(variable: Variable) -> str:
     low, high = variable.minimum, variable.maximum
@@ -364,7 +368,7 @@ def _variable(scalar: Any) -> Variable:
 
 
 @dataclass(frozen=True)
-class Provenance:
+class Source:
     """Where one group of values of the paper's example comes from."""
 
     group: str
@@ -372,21 +376,21 @@ class Provenance:
     source: str  # "the paper's" or "ours"
 
 
-PAPER_EXAMPLE_PROVENANCE = (
-    Provenance("costs", ("cost_quadratic", "cost_linear", "cost_coupling"), "the paper's"),
-    Provenance("unknown dynamics g", ("dynamics_gain",), "the paper's"),
-    Provenance("disturbances d", ("disturbance_amplitude", "disturbance_frequency"), "the paper's"),
-    Provenance("RBF centres and width", ("center", "rho"), "the paper's"),
-    Provenance("weight bound and adaptation", ("W_max", "beta"), "the paper's"),
-    Provenance("robust term", ("delta", "epsilon"), "the paper's"),
-    Provenance("initial actions and velocities", ("x0", "v0"), "the paper's"),
-    Provenance("gains", ("k1", "k2", "k3", "k4"), "ours: the paper prints none"),
-    Provenance("communication graph", ("a",), "ours: the paper's figure was not at hand"),
-    Provenance("initial references and estimates", ("z0", "y0"), "ours: zero, the paper does not say"),
+PAPER_EXAMPLE_SOURCES = (
+    Source("costs", ("cost_quadratic", "cost_linear", "cost_coupling"), "the paper's"),
+    Source("unknown dynamics g", ("dynamics_gain",), "the paper's"),
+    Source("disturbances d", ("disturbance_amplitude", "disturbance_frequency"), "the paper's"),
+    Source("RBF centres and width", ("center", "rho"), "the paper's"),
+    Source("weight bound and adaptation", ("W_max", "beta"), "the paper's"),
+    Source("robust term", ("delta", "epsilon"), "the paper's"),
+    Source("initial actions and velocities", ("x0", "v0"), "the paper's"),
+    Source("gains", ("k1", "k2", "k3", "k4"), "ours: the paper prints none"),
+    Source("communication graph", ("a",), "ours: the paper's figure was not at hand"),
+    Source("initial references and estimates", ("z0", "y0"), "ours: zero, the paper does not say"),
 )
 """The paper's example group by group: which values are printed in the paper and which are decided here."""
 
 
-def provenance(model: Model) -> tuple[Provenance, ...]:
+def sources(model: Model) -> tuple[Source, ...]:
     """Sources of the paper's example; empty for any other game, whose file is its source."""
-    return PAPER_EXAMPLE_PROVENANCE if model.is_paper_example else ()
+    return PAPER_EXAMPLE_SOURCES if model.is_paper_example else ()

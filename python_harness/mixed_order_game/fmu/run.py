@@ -8,17 +8,24 @@ import os
 import shutil
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from ctypes import POINTER, c_double, c_int, c_uint
+from ctypes import c_double, c_int, c_uint
 from itertools import pairwise
 from pathlib import Path
 from threading import Lock
 from types import TracebackType
-from typing import Any, Self, cast
+from typing import Any, Protocol, Self, cast
 
 import fmpy
 import numpy as np
 from fmpy.fmi1 import FMICallException
-from fmpy.fmi2 import FMU2Slave, defaultCallbacks, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE, fmi2Discard
+from fmpy.fmi2 import (
+    FMU2Slave,
+    defaultCallbacks,
+    fmi2CallbackFunctions,
+    fmi2CallbackLoggerTYPE,
+    fmi2Discard,
+    fmi2True,
+)
 from numpy.typing import ArrayLike, NDArray
 
 from ..arguments import array_argument, number_argument
@@ -202,8 +209,6 @@ class Simulator:
         Raises VariableError for a variable that does not exist or does not take its value, SimulationError
         for times, shapes and tolerances that make no sense and for whatever the FMU refuses.
         """
-        if self._slave is None:
-            raise SimulationError("the simulator is closed")
         if stop_time is None:
             stop_time = number_argument(start_time, "start_time", SimulationError) + self.model.stop_time
         start_time, stop_time, step, tolerance = (
@@ -224,35 +229,104 @@ class Simulator:
         disturbance = _disturbance(self.model, inputs, time)
         if inputs is not None:
             _check_set_once(self.model, [start, *schedule.values()])
-        recorder = _Recorder(self._slave, self._recorded(outputs), len(time))
-        points = np.union1d(time, [*schedule, *disturbance.times]).tolist()
+        recorder = _Columns(self._recorded(outputs), len(time))
+        messages = self._walk(
+            time,
+            recorder,
+            values={name: parameters[name] for name in start},
+            tolerance=tolerance,
+            schedule=schedule,
+            disturbance=disturbance,
+            progress=progress,
+        )
+        return self.result(
+            time,
+            recorder.columns(),
+            parameters=parameters,
+            step=step,
+            tolerance=tolerance,
+            stop_time=stop_time,
+            messages=messages,
+        )
 
+    @in_turn
+    def walk(
+        self,
+        time: NDArray[np.float64],
+        recorder: "Recorder",
+        *,
+        values: Mapping[str, Value],
+        tolerance: float,
+    ) -> tuple[str, ...]:
+        """Run through times (T,), in s, of any spacing, and let a recorder read at each.
+
+        Returns what the FMU logged. Raises VariableError for a value that the FMU would not take,
+        SimulationError for whatever it refuses.
+        """
+        start = self.model.expanded(values)
+        checked = {name: check_value(self.model.variable(name), value) for name, value in start.items()}
+        return self._walk(time, recorder, values=checked, tolerance=tolerance)
+
+    def _walk(
+        self,
+        time: NDArray[np.float64],
+        recorder: "Recorder",
+        *,
+        values: Mapping[str, Value],
+        tolerance: float,
+        schedule: "Mapping[float, Mapping[str, Value]] | None" = None,
+        disturbance: "_Inputs | None" = None,
+        progress: Progress | None = None,
+    ) -> tuple[str, ...]:
+        slave = self._slave
+        if slave is None:
+            raise SimulationError("the simulator is closed")
+        schedule = schedule or {}
+        asked = [] if disturbance is None else disturbance.times
+        points = np.union1d(time, [*schedule, *asked]).tolist()
+        samples = time.tolist()
         try:
             with noted_signals() as take_signals:
-                self._initialize({name: parameters[name] for name in start}, time, tolerance)
-                disturbance.set(self._slave, points[0])
-                self._slave.exitInitializationMode()
-                recorder.read(0)
-                sample = 1
+                self._initialize(values, samples, tolerance)
+                if disturbance is not None:
+                    disturbance.set(slave, points[0])
+                slave.exitInitializationMode()
+                read = recorder.reader(slave)
+                read(0)
+                sample, step, component = 1, slave.fmi2DoStep, slave.component
                 for begin, end in pairwise(points):
                     take_signals()
-                    disturbance.set(self._slave, begin)
+                    if disturbance is not None:
+                        disturbance.set(slave, begin)
                     if begin in schedule:
                         self._set(schedule[begin])
-                    self._slave.doStep(begin, end - begin)
-                    if end == time[sample]:
-                        recorder.read(sample)
+                    step(component, begin, end - begin, fmi2True)
+                    if end == samples[sample]:
+                        read(sample)
                         sample += 1
                         if progress is not None:
                             progress(end)
-                self._slave.terminate()
+                slave.terminate()
         except FMICallException as error:
             raise SimulationError(self._said() or str(error)) from error
+        return tuple(message for _, message in self._messages)
 
+    def result(
+        self,
+        time: NDArray[np.float64],
+        columns: Mapping[str, NDArray[np.float64]],
+        *,
+        parameters: Mapping[str, Value],
+        stop_time: float,
+        step: float,
+        tolerance: float,
+        messages: tuple[str, ...],
+    ) -> Result:
+        """The Result of a walk, with what the model tells of its game and of the columns' units."""
         return Result(
             time=time,
-            columns=recorder.columns(),
-            units={variable.name: variable.unit or "" for variable in recorder.variables},
+            columns=columns,
+            units={name: self.model.variable(name).unit or "" for name in columns},
             parameters=parameters,
             title=self.model.title,
             guid=self.model.guid,
@@ -260,18 +334,16 @@ class Simulator:
             stop_time=stop_time,
             step=step,
             tolerance=tolerance,
-            messages=tuple(message for _, message in self._messages),
-            changed={
-                name: value for name, value in parameters.items() if self.model.variable(name).start != value
-            },
+            messages=messages,
+            changed=self.model.changed_values(parameters),
         )
 
-    def _initialize(self, values: Mapping[str, Value], time: NDArray[np.float64], tolerance: float) -> None:
+    def _initialize(self, values: Mapping[str, Value], time: Sequence[float], tolerance: float) -> None:
         self._messages.clear()
         if self._used:
             self._slave.reset()
         self._used = True
-        self._slave.setupExperiment(tolerance=tolerance, startTime=float(time[0]), stopTime=float(time[-1]))
+        self._slave.setupExperiment(tolerance=tolerance, startTime=time[0], stopTime=time[-1])
         self._set(values)
         self._slave.enterInitializationMode()
 
@@ -306,41 +378,69 @@ class Simulator:
         return next((text for status, text in reversed(self._messages) if status >= fmi2Discard), "")
 
 
-class _Recorder:
-    """Reads the chosen variables straight into the rows of two arrays, one for reals, one for integers."""
+class Recorder(Protocol):
+    """Takes what it wants from the instance at each sample of a run."""
 
-    def __init__(self, slave: Any, variables: Sequence[Variable], samples: int) -> None:
+    def reader(self, slave: Any) -> Callable[[int], None]:
+        """Called at the first sample; what it returns is called at sample 0, 1, ... in turn."""
+
+
+class Block:
+    """Variables that are all reals or all integers, read in one call into a row of their values."""
+
+    def __init__(self, variables: Sequence[Variable], rows: int) -> None:
         self.variables = variables
-        self._slave = slave
-        self._reals = [variable for variable in variables if variable.type == "Real"]
-        self._integers = [variable for variable in variables if variable.type != "Real"]
-        self._real_references = _references(self._reals)
-        self._integer_references = _references(self._integers)
-        self._real_values = np.empty((samples, len(self._reals)))
-        self._integer_values = np.empty((samples, len(self._integers)), dtype=np.int32)
+        real = all(variable.type == "Real" for variable in variables)
+        kind = c_double if real else c_int
+        self._getter = "fmi2GetReal" if real else "fmi2GetInteger"
+        self._references = _references(variables)
+        self.values = np.empty((rows, len(variables)), dtype=np.float64 if real else np.int32)
+        """(rows, variables)"""
+        buffer: Any = self.values
+        self._rows: Any = (kind * len(variables) * rows).from_buffer(buffer) if variables else None
 
-    def read(self, sample: int) -> None:
-        component = self._slave.component
-        if self._reals:
-            row = self._real_values[sample].ctypes.data_as(POINTER(c_double))
-            self._slave.fmi2GetReal(component, self._real_references, len(self._reals), row)
-        if self._integers:
-            row_of_integers = self._integer_values[sample].ctypes.data_as(POINTER(c_int))
-            self._slave.fmi2GetInteger(
-                component, self._integer_references, len(self._integers), row_of_integers
-            )
+    def reader(self, slave: Any) -> Callable[[int], None]:
+        """What reads all of them into a row."""
+        get, component = getattr(slave, self._getter), slave.component
+        references, count, rows = self._references, len(self.variables), self._rows
+
+        def read(row: int) -> None:
+            get(component, references, count, rows[row])
+
+        return read if count else lambda _row: None
 
     def columns(self) -> dict[str, NDArray[np.float64]]:
-        """Columns in the order of the variables; integers below 2^53 are exact as floats."""
-        columns = {
-            variable.name: np.ascontiguousarray(self._real_values[:, position])
-            for position, variable in enumerate(self._reals)
+        """The values by variable; integers below 2^53 are exact as floats."""
+        return {
+            variable.name: np.ascontiguousarray(self.values[:, position], dtype=np.float64)
+            for position, variable in enumerate(self.variables)
         }
-        columns |= {
-            variable.name: self._integer_values[:, position].astype(np.float64)
-            for position, variable in enumerate(self._integers)
-        }
-        return {variable.name: columns[variable.name] for variable in self.variables}
+
+
+class _Columns:
+    """Records variables of all types."""
+
+    def __init__(self, variables: Sequence[Variable], samples: int) -> None:
+        self._variables = variables
+        self._blocks = [
+            Block([variable for variable in variables if (variable.type == "Real") is real], samples)
+            for real in (True, False)
+        ]
+
+    def reader(self, slave: Any) -> Callable[[int], None]:
+        reals, others = (block.reader(slave) for block in self._blocks)
+
+        def read(sample: int) -> None:
+            reals(sample)
+            others(sample)
+
+        return read
+
+    def columns(self) -> dict[str, NDArray[np.float64]]:
+        """Columns in the order of the variables."""
+        reals, others = (block.columns() for block in self._blocks)
+        columns = reals | others
+        return {variable.name: columns[variable.name] for variable in self._variables}
 
 
 class _Inputs:

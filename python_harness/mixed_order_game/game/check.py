@@ -1,15 +1,14 @@
-"""Checks a game file and tells problems with their lines.
+"""Checks a game file and tells problems with their places.
 
 The judge is the host tool that makes FMUs: a game is valid when it says so. It stops at the first problem and
-names the entry; the line comes from the file's syntax tree, and the JSON Schema finds those after it that a
-schema can.
+tells where every entry of the file stands; the JSON Schema finds those problems after it that a schema can.
 """
 
 import difflib
+import json
 import math
-import re
 import subprocess
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -17,25 +16,21 @@ from typing import Any
 from ..errors import BuildError, GameError, reason
 from ..files.reading import ReadError, expect_file, read_text, toml_of
 from ..fmu.build import game_file, host_tool
-from .positions import Path as Entry
-from .positions import Positions
 from .schema import game_schema
-
-NOT_TOML = re.compile(r"line (\d+)(?:, column \d+)? of the game definition (.*)")
-UNKNOWN_KEY = re.compile(r'"(.*)" is an unknown key of (\S+|the game definition), ')
-ENTRY = re.compile(r"((?:[A-Za-z_]\w*)(?:\.\w+|\[\d+\])*) (?:is|leaves|has) ")
-EXPRESSION = re.compile(r"([A-Za-z_]\w*(?:\.\w+|\[\d+\])*), line (\d+), column \d+: .*")
-STEP = re.compile(r"(\w+)|\[(\d+)\]")
 
 LONGEST_TEXT = 40
 LONGEST_LIST = 4
 
+Entry = tuple[str | int, ...]
+"""Keys and 0-based list positions; () is the file itself."""
 
-@dataclass(frozen=True)
+
+@dataclass(frozen=True, order=True)
 class Problem:
-    """One thing wrong with a game file."""
+    """One thing wrong with a game file. Line and column count from one."""
 
-    line: int  # 1-based
+    line: int
+    column: int
     sentence: str
 
 
@@ -52,83 +47,41 @@ def check_game(game: Path | str) -> tuple[Problem, ...]:
     """
     game = game_file(game)
     expect_file(game, "game file", GameError)
-    sentence = _judge(game)
-    if sentence is None:
+    answer = _judged(game)
+    if answer["problem"] is None:
         return ()
-    not_toml = NOT_TOML.fullmatch(sentence)
-    if not_toml is not None:
-        return (Problem(int(not_toml[1]), f"the file {not_toml[2]}"),)
+    told = answer["problem"]
+    problems = {Problem(told["line"], told["column"], told["message"])}
     try:
-        text = read_text(game)
-        document = toml_of(text)
-    except ReadError:  # not UTF-8, or a fine point of TOML on which parsers differ
-        return (Problem(1, sentence),)
-    positions = Positions(text)
-    first = _Found(_entry_of(sentence, document), sentence)
-    expression = EXPRESSION.fullmatch(sentence)
-    if expression is not None:  # which knows its line, the text's own may be an earlier one
-        first = _Found(_parsed(expression[1]), sentence)
-    found = [first, *(each for each in _violations(document) if each.entry != first.entry)]
-    problems = {Problem(positions.line(each.entry), each.sentence): None for each in found}
-    if expression is not None:
-        del problems[Problem(positions.line(first.entry), sentence)]
-        problems[Problem(int(expression[2]), sentence)] = None
-    return tuple(sorted(problems, key=lambda problem: problem.line))
+        document = toml_of(read_text(game))
+    except ReadError:  # not UTF-8, not TOML, or a fine point of TOML on which parsers differ
+        document = {}
+    if document:
+        places = answer["places"]
+        others = (each for each in _violations(document) if _shown(each.entry) != told["entry"])
+        problems |= {Problem(*_place(each.entry, places), each.sentence) for each in others}
+    return tuple(sorted(problems))
 
 
-def _judge(game: Path) -> str | None:
-    """The host tool's sentence about a game; None if it is valid."""
+def _judged(game: Path) -> Any:
+    """The host tool's answer about a game; problem is None if it is valid."""
     tool = host_tool()
     try:
-        finished = subprocess.run(
-            [str(tool), "--check", str(game)],
-            capture_output=True,
-            encoding="utf-8",
-            errors="replace",
-            check=False,
-        )
+        finished = subprocess.run([str(tool), "--check", str(game)], capture_output=True, check=False)
     except OSError as error:
         raise BuildError(f"cannot run {tool}: {reason(error)}") from error
-    if finished.returncode == 0:
-        return None
-    if finished.returncode != 1:
-        raise BuildError(f"{tool.name} ended with status {finished.returncode}: {finished.stderr.strip()}")
-    return " ".join(finished.stderr.split()).removeprefix(f"{game}: ")
+    if finished.stdout and finished.returncode in (0, 1):
+        return json.loads(finished.stdout)
+    said = finished.stderr.decode("utf-8", errors="replace").strip()
+    raise BuildError(f"{tool.name} ended with status {finished.returncode}: {said}")
 
 
-def _entry_of(sentence: str, document: Mapping[str, Any]) -> Entry:
-    """The entry that a sentence of the host tool is about; () if it is about the whole game."""
-    unknown = UNKNOWN_KEY.match(sentence)
-    if unknown is not None:
-        table = () if unknown[2] == "the game definition" else _parsed(unknown[2])
-        keys = _at(document, table)
-        cut = unknown[1].removesuffix(
-            "..."
-        )  # of a long key, control characters replaced, only the begin is told
-        near = (key for key in keys if cut != unknown[1] and _readable(key).startswith(cut))
-        key = unknown[1] if unknown[1] in keys else next(near, unknown[1])
-        return (*table, key)
-    for name in _names_of_parameters(document):  # that need not be words
-        if sentence.startswith(f"parameters.{name} is "):
-            return "parameters", name
-    entry = ENTRY.match(sentence)
-    return () if entry is None else _parsed(entry[1])
-
-
-def _names_of_parameters(document: Mapping[str, Any]) -> Iterable[str]:
-    parameters = document.get("parameters")
-    return parameters if isinstance(parameters, Mapping) else ()
-
-
-def _parsed(path: str) -> Entry:
-    """player[2].cost as ("player", 1, "cost")."""
-    return tuple(key or int(number) - 1 for key, number in STEP.findall(path))
-
-
-def _at(document: Any, entry: Entry) -> Any:
-    for step in entry:
-        document = document[step]
-    return document
+def _place(entry: Entry, places: Mapping[str, Sequence[int]]) -> tuple[int, int]:
+    """Line and column of an entry, of what would hold it if there is no such entry."""
+    while entry and _shown(entry) not in places:
+        entry = entry[:-1]
+    line, column = places[_shown(entry)] if entry else (1, 1)
+    return line, column
 
 
 def _violations(document: Mapping[str, Any]) -> Iterator[_Found]:

@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 
 from ..errors import ResultError
 from ..names import indices_of
-from ..results.metrics import metrics
 from ..results.plot import (
     BELOW_FLOOR,
     PALETTE,
@@ -103,7 +102,7 @@ def _choose_range(figure: Figure, result: Result) -> None:
         return
     begin, end = float(result.time[0]), float(result.time[-1])
     figure.ranges = [("whole run", [begin, end])]
-    settled = metrics(result).settling_time
+    settled = result.metrics.settling_time
     if 0.0 < TRANSIENT * settled < SHORT_TRANSIENT * (end - begin):
         figure.ranges.append(("transient", [begin, begin + TRANSIENT * settled]))
         if figure.name not in LATE:

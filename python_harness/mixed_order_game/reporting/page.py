@@ -12,10 +12,10 @@ import numpy as np
 
 from ..errors import GameError
 from ..files.writing import PAGE, RESULT, check_output, write_file
-from ..fmu.model import Value, provenance
+from ..fmu.model import Value, sources
 from ..game.parameters import game_parameters
 from ..names import parse_name
-from ..results.metrics import SETTLED, changed_values, metrics
+from ..results.metrics import SETTLED
 from ..results.plot import edges_of, is_directed
 from ..results.result import Result, load
 from ..version import package_version
@@ -106,7 +106,7 @@ def render_page(evidence: Evidence) -> str:
             for i, j, w in edges_of(evidence.result)
         ],
         others=_others(evidence.result),
-        sources=() if evidence.model is None else provenance(evidence.model),
+        sources=() if evidence.model is None else sources(evidence.model),
         provenance=_provenance(evidence),
         messages=evidence.result.messages,
     )
@@ -126,7 +126,7 @@ def _summary(evidence: Evidence) -> list[tuple[str, str]]:
         ("coordinates", str(result.dimension)),
         ("duration", f"{result.time[-1] - result.time[0]:g} s"),
     ]
-    found = metrics(result)
+    found = result.metrics
     if "nash_error" in result.columns:
         tiles.append(("|x - x*| at the end", f"{result.nash_error[-1]:.3g}"))
     tiles += [
@@ -154,7 +154,7 @@ def _settings(evidence: Evidence) -> list[tuple[str, str, str]]:
         return []
     return [
         (name, _number(value), _number(model.variable(name).start))
-        for name, value in changed_values(model, result.parameters).items()
+        for name, value in model.changed_values(result.parameters).items()
     ]
 
 

@@ -1,20 +1,16 @@
 """What people compare between runs: settling time, overshoot, control energy, final error, events.
 
-Pure functions of sampled signals, gathered for a Result by metrics() and, with its origin, by provenance().
+Pure functions of sampled signals; Result.metrics gathers them for a run.
 """
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import ResultError
-from ..fmu.model import Model, Value
-from ..names import gather, indices_of
 from ..times import in_seconds, time_slack
-from .result import Result
 
 FloatArray = NDArray[np.float64]
 
@@ -55,41 +51,6 @@ METRIC_UNITS: Mapping[str, str] = {
     "events": "",
 }
 """The figures that tables show, in their order, with their units; those of x and u are the game's own."""
-
-
-@dataclass(frozen=True)
-class RunProvenance:
-    """Where a run comes from: enough to repeat it."""
-
-    package_version: str
-    guid: str
-    changed: Mapping[str, Value]  # parameters and inputs that differ from the FMU's start values
-    seed: int | None  # of whatever was drawn at random; None if nothing was
-
-    def as_json(self) -> dict[str, Any]:
-        """Plain values for json.dumps."""
-        return {**asdict(self), "changed": dict(self.changed)}
-
-
-def metrics(result: Result, *, band: float | None = None, settle_time: float | None = None) -> Metrics:
-    """Figures of a recorded run.
-
-    band: largest |x - x*| that counts as settled; default 2 % of the initial one.
-    settle_time: time in s from which the final error is taken; default 80 % of the run.
-    Raises ResultError if x or x_star was not recorded, or nothing was from settle_time on.
-    """
-    x_star = gather(result.columns, "x_star", (result.players, result.dimension))
-    if x_star is None:
-        raise ResultError("x_star was not recorded: name it in the outputs of the run")
-    events = result.columns.get("solver_events")
-    return sampled_metrics(
-        result.time,
-        result.x - x_star,
-        result.u if indices_of(result.columns, "u") else None,
-        events=float("nan") if events is None else float(events[-1]),
-        band=band,
-        settle_time=settle_time,
-    )
 
 
 def sampled_metrics(
@@ -162,15 +123,3 @@ def sample_times(stop_time: float, step: float) -> FloatArray:
     first = min(START_STEPS, count)
     fine = regular[first] * (np.arange(first * FINER) / (first * FINER))
     return np.concatenate([fine, regular[first:]])
-
-
-def provenance(model: Model, parameters: Mapping[str, Value], *, seed: int | None = None) -> RunProvenance:
-    """Provenance of a run with these parameters, such as a result's; those not named have start values."""
-    from ..version import package_version
-
-    return RunProvenance(package_version(), model.guid, changed_values(model, parameters), seed)
-
-
-def changed_values(model: Model, parameters: Mapping[str, Value]) -> dict[str, Value]:
-    """Those of the parameters and inputs that differ from the FMU's start values."""
-    return {name: value for name, value in parameters.items() if model.variable(name).start != value}

@@ -19,12 +19,12 @@ from ..files.reading import ReadError, expect_file, number_of, read_table, suffi
 from ..files.writing import RESULT, write_file
 from ..names import gather, indices_of, parse_name
 from ..times import in_seconds, time_slack
+from .metrics import Metrics, sampled_metrics
 
 if TYPE_CHECKING:
     import pandas as pd
     import xarray
 
-    from .metrics import Metrics
 
 FloatArray = NDArray[np.float64]
 
@@ -180,11 +180,26 @@ class Result:
         return _largest(np.nan_to_num(self.v), self.window(begin, end))
 
     @property
-    def metrics(self) -> "Metrics":
-        """Settling time, overshoot, control energy, final error, events; raises ResultError without x."""
-        from .metrics import metrics
+    def metrics(self) -> Metrics:
+        """Settling time, overshoot, control energy, final error, events; raises as measured does."""
+        return self.measured()
 
-        return metrics(self)
+    def measured(self, *, band: float | None = None, settle_time: float | None = None) -> Metrics:
+        """The metrics with a band of one's own.
+
+        band: largest |x - x*| that counts as settled; default 2 % of the initial one.
+        settle_time: time in s from which the final error is taken; default 80 % of the run.
+        Raises ResultError if x or x_star was not recorded, or nothing was from settle_time on.
+        """
+        events = self.columns.get("solver_events")
+        return sampled_metrics(
+            self.time,
+            self.x - self.equilibria,
+            self.u if indices_of(self.columns, "u") else None,
+            events=float("nan") if events is None else float(events[-1]),
+            band=band,
+            settle_time=settle_time,
+        )
 
     def window(self, begin: float, end: float) -> NDArray[np.bool_]:
         """(T,), true for samples in [begin, end], in s, rounding forgiven. Raises ResultError if none is."""

@@ -12,7 +12,7 @@ from typing import Any
 from ..errors import MixedOrderGameError, ResultError, SimulationError
 from ..fmu.model import Value
 from ..interrupts import noted_signals
-from ..results.metrics import METRIC_UNITS, Metrics, changed_values, metrics
+from ..results.metrics import METRIC_UNITS, Metrics
 from ..results.result import Result, load
 from .sampler import Sampler, Settings
 
@@ -118,7 +118,7 @@ def compare(
         model = sampler.model
         shared = model.expanded(start_values or {})
         starts = {label: {**shared, **model.expanded(values)} for label, values in wanted.items()}
-        changes = {label: changed_values(model, model.start_values(start)) for label, start in starts.items()}
+        changes = {label: model.changed_values(model.start_values(start)) for label, start in starts.items()}
         for label, start in starts.items():
             take_signals()
             try:
@@ -126,7 +126,7 @@ def compare(
             except SimulationError as error:
                 runs.append(Compared(label, changes[label], None, None, str(error)))
                 continue
-            found = metrics(result, band=band, settle_time=chosen.settle_time)
+            found = result.measured(band=band, settle_time=chosen.settle_time)
             band = found.band if band is None else band
             runs.append(Compared(label, changes[label], result, found))
     return Comparison(tuple(runs))
@@ -138,7 +138,7 @@ def compare_results(
     """Set recorded runs side by side. Raises ResultError if one lacks x or x_star."""
     runs: list[Compared] = []
     for label, result in results.items():
-        found = metrics(result, band=band, settle_time=settle_time)
+        found = result.measured(band=band, settle_time=settle_time)
         band = found.band if band is None else band
         runs.append(Compared(label, dict(result.changed), result, found))
     return Comparison(tuple(runs))
