@@ -5,51 +5,10 @@
 >>> result.x.shape  # time, player, coordinate
 (1001, 5, 2)
 
-The figures are in mixed_order_game.results.plot, the command is mog.
+The names stand in __init__.pyi; each is imported when it is first used. The figures are in
+mixed_order_game.results.plot, the command is mog.
 """
 
-from .errors import (
-    BuildError,
-    GameError,
-    MixedOrderGameError,
-    ModelError,
-    PlotError,
-    ResultError,
-    SimulationError,
-    VariableError,
-)
-from .fmu.build import build_fmu, cached_fmu, default_fmu, default_game
-from .fmu.model import Model, Variable, read_model
-from .fmu.run import Simulator, run
-from .results.result import Result, load
-from .studies.validate import Claim, Validation, Verdict, validate
-from .version import package_version
+import lazy_loader
 
-__version__ = package_version()
-
-__all__ = [
-    "BuildError",
-    "Claim",
-    "GameError",
-    "MixedOrderGameError",
-    "Model",
-    "ModelError",
-    "PlotError",
-    "Result",
-    "ResultError",
-    "SimulationError",
-    "Simulator",
-    "Validation",
-    "Variable",
-    "VariableError",
-    "Verdict",
-    "build_fmu",
-    "cached_fmu",
-    "default_fmu",
-    "default_game",
-    "load",
-    "package_version",
-    "read_model",
-    "run",
-    "validate",
-]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

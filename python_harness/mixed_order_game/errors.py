@@ -43,5 +43,9 @@ class ResultError(MixedOrderGameError):
     """A file that cannot be read, written or replaced, or a signal that was not recorded."""
 
 
+class MissingPackageError(MixedOrderGameError):
+    """A package that an extra brings is not installed; the text names the extra."""
+
+
 class PlotError(MixedOrderGameError):
     """A figure that cannot be drawn from the result given."""

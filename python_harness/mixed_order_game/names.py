@@ -1,10 +1,7 @@
 """Structured names of FMI 2.0 with 1-based indices: x[1,2] is the stem x with index (1, 2)."""
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
-
-import numpy as np
-from numpy.typing import NDArray
+from collections.abc import Iterable
 
 INDEXED = re.compile(r"([^\[\]]+)\[(\d+(?:,\d+)*)\]")
 
@@ -26,20 +23,3 @@ def indices_of(names: Iterable[str], stem: str) -> dict[tuple[int, ...], str]:
     """Names of one stem by their 1-based indices."""
     parsed = ((parse_name(name), name) for name in names)
     return {index: name for (each, index), name in parsed if each == stem}
-
-
-def gather(
-    columns: Mapping[str, NDArray[np.float64]], stem: str, shape: Sequence[int]
-) -> NDArray[np.float64] | None:
-    """Columns stem[i,...] of (T,) samples as one array (T, *shape), NaN where there is no column.
-
-    None if no column of that stem exists.
-    """
-    found = indices_of(columns, stem)
-    if not found:
-        return None
-    samples = len(columns[next(iter(found.values()))])
-    array = np.full((*shape, samples), np.nan)
-    for index, name in found.items():
-        array[tuple(position - 1 for position in index)] = columns[name]
-    return np.ascontiguousarray(np.moveaxis(array, -1, 0))

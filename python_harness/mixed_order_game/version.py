@@ -9,3 +9,6 @@ def package_version() -> str:
         return version("mixed-order-game")
     except PackageNotFoundError:
         return "not installed"
+
+
+__version__ = package_version()

@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from mixed_order_game import Result, ResultError, load
-from mixed_order_game.names import gather, parse_name, split_names
+from mixed_order_game.names import parse_name, split_names
+from mixed_order_game.results.result import gather
 
 T, N, D = 7, 3, 2
 ORDER = (1, 2, 1)

@@ -14,9 +14,10 @@ import pytest
 
 from mixed_order_game import MixedOrderGameError, ModelError, PlotError, ResultError, VariableError
 from mixed_order_game.game.graphs import GraphError, graphs_of_text
-from mixed_order_game.studies.designs import DesignError, Range, Sampling
+from mixed_order_game.studies.designs import DesignError, Range
 from mixed_order_game.studies.pool import PoolError
 from mixed_order_game.studies.sampler import Sampler, Settings
+from mixed_order_game.studies.sampling import Sampling
 from mixed_order_game.studies.sweep.conduct import connected_graphs_example, sweep
 from mixed_order_game.studies.sweep.definition import Sweep
 from mixed_order_game.studies.sweep.figures import check_heat_map, plot_edges, plot_heat_map

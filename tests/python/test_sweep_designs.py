@@ -7,12 +7,12 @@ from scipy.stats import qmc
 from mixed_order_game.studies.designs import (
     DesignError,
     Range,
-    Sampling,
     grid_of_text,
     initial_states,
     range_of_text,
     sample,
 )
+from mixed_order_game.studies.sampling import Sampling
 
 
 def test_grids() -> None:

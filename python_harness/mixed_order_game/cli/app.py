@@ -14,7 +14,6 @@ import typer.core
 
 from ..errors import MixedOrderGameError, reason
 from ..interrupts import INTERRUPTED, end_as_exceptions
-from ..version import package_version
 from .analyse import analyse
 from .build import build
 from .check import check
@@ -60,6 +59,8 @@ app = typer.Typer(
 
 def _version(value: bool) -> None:
     if value:
+        from ..version import package_version
+
         typer.echo(f"mog {package_version()}")
         raise typer.Exit
 

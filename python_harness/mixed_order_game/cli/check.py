@@ -14,6 +14,7 @@ def check(
     [bold]Example:[/bold] mog check my_game.toml
     """
     from ..errors import GameError
+    from ..extras import has, install
     from ..game.check import check_game
 
     broken = False
@@ -30,4 +31,8 @@ def check(
             typer.echo(f"{game} is valid")
         broken = broken or bool(problems)
     if broken:
+        if not has("jsonschema"):
+            typer.echo(
+                f"mog: only the first problem of each file; for all: {install('jsonschema')}", err=True
+            )
         raise typer.Exit(1)

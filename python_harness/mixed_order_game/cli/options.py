@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Annotated, TypeVar
 
 import typer
 
-from ..arguments import value_of_text
 from ..files.writing import Kind, check_output
 from ..names import split_names
 
@@ -75,6 +74,8 @@ def output_option(
 
 def settings_of(texts: Iterable[str], hint: str = "--set") -> "dict[str, Value]":
     """NAME=VALUE, each name once."""
+    from ..arguments import value_of_text
+
     return pairs_of(texts, value_of_text, hint)
 
 

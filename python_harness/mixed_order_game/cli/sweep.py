@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ..game.graphs import GRAPHS_HELP
+from ..game.graph_kinds import GRAPHS_HELP
 from ..interrupts import INTERRUPTED
-from ..studies.designs import Sampling
+from ..studies.sampling import Sampling
 from .options import (
     BandOption,
     ForceOption,

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ..game.graphs import GRAPHS_HELP
+from ..game.graph_kinds import GRAPHS_HELP
 from ..interrupts import INTERRUPTED
 from .options import BandOption, GameArgument, SettingsOption, graphs_option, pairs_of, settings_of
 

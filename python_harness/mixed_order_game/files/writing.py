@@ -7,7 +7,6 @@ forced; it goes through symbolic links, keeps the permissions of what it replace
 import csv
 import json
 import os
-import secrets
 import stat
 import zipfile
 from collections.abc import Callable, Iterable
@@ -17,6 +16,7 @@ from pathlib import Path
 from typing import IO, Any
 
 from ..errors import ResultError, reason
+from ..extras import need
 from ..names import parse_name
 from .reading import suffix_of
 
@@ -61,6 +61,8 @@ def check_output(
     for each in inputs:
         if each is not None and _same(target, each):
             raise ResultError(f"{path} is what is read here: name another file")
+    if suffix_of(path) == ".parquet":
+        need("pyarrow")
     if os.path.lexists(target):
         _check_existing(path, target, kind, force=force)
     else:
@@ -101,7 +103,7 @@ def write_whole(path: Path, write: Callable[[IO[bytes]], object]) -> None:
     try:
         target = _target(path)
         target.parent.mkdir(parents=True, exist_ok=True)
-        partial = target.with_name(f"{PARTIAL_PREFIX}{secrets.token_hex(8)}{PARTIAL_SUFFIX}")
+        partial = target.with_name(f"{PARTIAL_PREFIX}{os.urandom(8).hex()}{PARTIAL_SUFFIX}")
         with partial.open("xb") as file:
             write(file)
         if target.exists():
@@ -170,12 +172,9 @@ def _is_structure(path: Path) -> bool:
 
 def _is_result(path: Path) -> bool:
     if suffix_of(path) == ".parquet":
-        import pyarrow as pa
-        import pyarrow.parquet
-
         try:
-            return b"mixed_order_game" in (pa.parquet.read_schema(path).metadata or {})
-        except pa.ArrowException:
+            return b"mixed_order_game" in (need("pyarrow.parquet").read_schema(path).metadata or {})
+        except need("pyarrow").ArrowException:
             return False
     return "x_star" in _stems(path)  # every run records it
 

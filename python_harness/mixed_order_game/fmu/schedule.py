@@ -95,7 +95,7 @@ def read_graph_schedule(path: Path | str, model: Model) -> GraphSchedule:
     """Read a schedule of graphs, .toml or .csv, for a game.
 
     TOML: a table [[graph]] per switch with time in s and either edges = [[1, 2], [2, 3, 0.5]] or a kind such
-    as graph = "ring" (see graphs.GRAPHS_HELP); optional period in s.
+    as graph = "ring" (see game.graph_kinds); optional period in s.
     CSV: the column time in s and columns a[i,j]; an empty cell keeps the weight, as does an edge without a
     column.
     Raises ScheduleError naming the file.

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import BuildError, GameError, reason
+from ..extras import has, need
 from ..files.reading import ReadError, expect_file, read_text, toml_of
 from ..fmu.build import game_file, host_tool
 from .schema import game_schema
@@ -43,6 +44,7 @@ class _Found:
 def check_game(game: Path | str) -> tuple[Problem, ...]:
     """The problems found in a game file, or in a game of the package by its name; empty if it is valid.
 
+    Only the first one where jsonschema is not installed.
     Raises GameError if there is no such file, BuildError if the installation lacks the host tool.
     """
     game = game_file(game)
@@ -56,7 +58,7 @@ def check_game(game: Path | str) -> tuple[Problem, ...]:
         document = toml_of(read_text(game))
     except ReadError:  # not UTF-8, not TOML, or a fine point of TOML on which parsers differ
         document = {}
-    if document:
+    if document and has("jsonschema"):
         places = answer["places"]
         others = (each for each in _violations(document) if _shown(each.entry) != told["entry"])
         problems |= {Problem(*_place(each.entry, places), each.sentence) for each in others}
@@ -86,8 +88,7 @@ def _place(entry: Entry, places: Mapping[str, Sequence[int]]) -> tuple[int, int]
 
 def _violations(document: Mapping[str, Any]) -> Iterator[_Found]:
     """What the JSON Schema finds, in the words of the host tool."""
-    import jsonschema
-
+    jsonschema = need("jsonschema")
     players, dimension = document.get("player"), document.get("dimension")
     schema = game_schema(
         players=len(players) if isinstance(players, list) else None,
@@ -101,7 +102,7 @@ def _violations(document: Mapping[str, Any]) -> Iterator[_Found]:
             ),
         }
     )
-    validator = jsonschema.validators.extend(jsonschema.Draft202012Validator, type_checker=checker)  # type: ignore[no-untyped-call]
+    validator = jsonschema.validators.extend(jsonschema.Draft202012Validator, type_checker=checker)
     for error in validator(schema).iter_errors(document):
         yield from _told(tuple(error.absolute_path), error, schema)
 

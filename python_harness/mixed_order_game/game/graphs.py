@@ -225,18 +225,10 @@ def _generators() -> dict[str, tuple[int, bool, Generator]]:
     }
 
 
-GRAPHS_HELP = (
-    "all (every connected labelled graph), classes (one of every isomorphism class), ring, path, star, "
-    "wheel, complete, tree, random:P, regular:DEGREE, small-world:K:P, scale-free:M, geometric:RADIUS, "
-    "directed:ring, directed:random:P, own (the game's), or edges such as 1-2,2-3:0.5 or, directed, "
-    "1>2,2>3,3>1; @COUNT after a random kind draws as many"
-)
-
-
 def graphs_of_text(
     text: str, players: int, *, seed: int = 0, own: CommunicationGraph | None = None
 ) -> list[CommunicationGraph]:
-    """Graphs by name, as GRAPHS_HELP tells; own is the graph called own. Random ones are drawn connected.
+    """Graphs by name, as graph_kinds tells; own is the graph called own. Random ones are drawn connected.
 
     Raises GraphError for a name or argument that makes no sense.
     """

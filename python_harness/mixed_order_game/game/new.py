@@ -41,7 +41,7 @@ class Recipe:
     players: int
     dimension: int = 2
     orders: str = "mixed"  # "mixed", "first", "second" or a list such as "1,1,2"
-    graph: str = "ring"  # one graph, named as graphs.GRAPHS_HELP tells
+    graph: str = "ring"  # one graph, named as graph_kinds tells
     seed: int = 0
     title: str | None = None
     schema: str | None = None  # path or URL for the editor's #:schema line

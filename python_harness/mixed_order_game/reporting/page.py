@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import GameError
+from ..extras import need
 from ..files.writing import PAGE, RESULT, check_output, write_file
 from ..fmu.model import Value, sources
 from ..game.parameters import game_parameters
@@ -62,6 +63,8 @@ def report(
 
     output = Path(output)
     check_output(output, PAGE, inputs=[source], force=force)
+    for module in ("jinja2", "plotly.offline"):
+        need(module)  # before any run
     if source is not None and RESULT.takes(Path(source)):
         if changes or stop_time is not None:
             raise GameError(f"{source} is a stored run: it takes neither parameters nor a stop time")
@@ -78,9 +81,7 @@ def report(
 
 def render_page(evidence: Evidence) -> str:
     """The HTML text; equal evidence gives equal text."""
-    import jinja2
-    from plotly.offline import get_plotlyjs
-
+    jinja2 = need("jinja2")
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(Path(__file__).parent),
         autoescape=True,
@@ -89,9 +90,9 @@ def render_page(evidence: Evidence) -> str:
         lstrip_blocks=True,
     )
     drawn = list(figures(evidence))
-    return environment.get_template(TEMPLATE).render(
+    text: str = environment.get_template(TEMPLATE).render(
         title=evidence.result.title or "Stored run",
-        plotly=get_plotlyjs(),
+        plotly=need("plotly.offline").get_plotlyjs(),
         figures=drawn,
         figure_data=_script_json({figure.name: figure.as_json() for figure in drawn}),
         summary=_summary(evidence),
@@ -110,6 +111,7 @@ def render_page(evidence: Evidence) -> str:
         provenance=_provenance(evidence),
         messages=evidence.result.messages,
     )
+    return text
 
 
 def _script_json(value: object) -> str:

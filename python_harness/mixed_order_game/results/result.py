@@ -4,9 +4,8 @@ N players, D coordinates, q neurons, T samples. Actions carry the game's own len
 """
 
 import csv
-import importlib
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
@@ -15,9 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import ResultError, reason
+from ..extras import need
 from ..files.reading import ReadError, expect_file, number_of, read_table, suffix_of
 from ..files.writing import RESULT, write_file
-from ..names import gather, indices_of, parse_name
+from ..names import indices_of, parse_name
 from ..times import in_seconds, time_slack
 from .metrics import Metrics, sampled_metrics
 
@@ -220,13 +220,13 @@ class Result:
 
     def to_pandas(self) -> "pd.DataFrame":
         """One row a sample, indexed by time, one column a variable."""
-        pandas = _optional("pandas")
+        pandas = need("pandas")
         frame: pd.DataFrame = pandas.DataFrame(dict(self.columns), index=pandas.Index(self.time, name="time"))
         return frame
 
     def to_xarray(self) -> "xarray.Dataset":
         """One array a signal, dimensions time, player, coordinate, ...; 1-based labels; NaN where none is."""
-        package = _optional("xarray")
+        package = need("xarray")
         arrays: dict[str, Any] = {}
         labels: dict[str, FloatArray | NDArray[np.int_]] = {"time": self.time}
         for stem in dict.fromkeys(parse_name(name)[0] for name in self.columns):
@@ -266,12 +266,9 @@ class Result:
         text.detach()
 
     def _write_parquet(self, file: IO[bytes]) -> None:
-        import pyarrow as pa
-        import pyarrow.parquet
-
-        table = pa.table({"time": self.time, **self.columns})
+        table = need("pyarrow").table({"time": self.time, **self.columns})
         metadata = json.dumps(self._metadata()).encode()
-        pa.parquet.write_table(table.replace_schema_metadata({METADATA_KEY: metadata}), file)
+        need("pyarrow.parquet").write_table(table.replace_schema_metadata({METADATA_KEY: metadata}), file)
 
     def _metadata(self, *, flat: bool = False) -> dict[str, Any]:
         stems = {parse_name(name)[0] for name in self.columns}
@@ -292,6 +289,23 @@ class Result:
             "messages": list(self.messages),
         }
         return metadata | ({name: json.dumps(each) for name, each in nested.items()} if flat else nested)
+
+
+def gather(
+    columns: Mapping[str, NDArray[np.float64]], stem: str, shape: Sequence[int]
+) -> NDArray[np.float64] | None:
+    """Columns stem[i,...] of (T,) samples as one array (T, *shape), NaN where there is no column.
+
+    None if no column of that stem exists.
+    """
+    found = indices_of(columns, stem)
+    if not found:
+        return None
+    samples = len(columns[next(iter(found.values()))])
+    array = np.full((*shape, samples), np.nan)
+    for index, name in found.items():
+        array[tuple(position - 1 for position in index)] = columns[name]
+    return np.ascontiguousarray(np.moveaxis(array, -1, 0))
 
 
 def load(path: Path | str) -> Result:
@@ -317,9 +331,7 @@ def _read_csv(path: Path) -> Result:
 
 
 def _read_parquet(path: Path) -> Result:
-    import pyarrow.parquet
-
-    table = pyarrow.parquet.read_table(path)
+    table = need("pyarrow.parquet").read_table(path)
     held = (table.schema.metadata or {}).get(METADATA_KEY)
     if held is None:
         raise ReadError("it does not tell of which game and run it is")
@@ -328,14 +340,6 @@ def _read_parquet(path: Path) -> Result:
     metadata.pop("metrics", None)  # Result computes them from its columns
     columns = {name: table.column(name).to_numpy() for name in table.column_names}
     return Result(time=columns.pop("time"), columns=columns, **metadata)
-
-
-def _optional(package: str) -> Any:
-    """An optional package. Raises ResultError with the way to install it."""
-    try:
-        return importlib.import_module(package)
-    except ImportError as error:
-        raise ResultError(f"this needs {package}: pip install {package}") from error
 
 
 def _largest(array: FloatArray, chosen: NDArray[np.bool_]) -> float:

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from enum import StrEnum
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +9,7 @@ from numpy.typing import NDArray
 from ..arguments import value_of_text
 from ..errors import MixedOrderGameError
 from ..fmu.model import Value
+from .sampling import Sampling
 
 FloatArray = NDArray[np.float64]
 
@@ -20,13 +20,6 @@ PLAIN_RANGE = 2
 
 class DesignError(MixedOrderGameError):
     """A design that makes no sense: an empty grid, a range without extent, a count that is not positive."""
-
-
-class Sampling(StrEnum):
-    """How points are drawn from ranges."""
-
-    LATIN_HYPERCUBE = "latin-hypercube"
-    SOBOL = "sobol"
 
 
 @dataclass(frozen=True)

@@ -26,6 +26,7 @@ from time import thread_time
 from typing import Any, Protocol
 
 from ..errors import MixedOrderGameError, ModelError, SimulationError
+from ..extras import need
 from ..fmu.model import Value
 from ..interrupts import blocked_interrupt
 from ..results.metrics import Metrics
@@ -200,11 +201,7 @@ class DaskPool:
     """Workers of a Dask cluster; the FMU goes to them as bytes, so that they need not share a file system."""
 
     def __init__(self, fmu: Path, scheduler: str, work: Work = run_chunk) -> None:
-        try:
-            import distributed
-        except ImportError as error:
-            raise PoolError("a Dask scheduler needs distributed: pip install distributed") from error
-        client: Any = distributed.Client
+        client: Any = need("distributed").Client
         try:
             self._client: Any = client(scheduler, timeout="10s", set_as_default=False)
         except (OSError, ValueError) as error:

@@ -5,3 +5,7 @@
 >>> result = sweep(Sweep(fmu, grid={"k1": (5.0, 10.0, 20.0)}), "gains")
 >>> result["settling_time"]
 """
+
+from ...extras import need
+
+need("pyarrow")  # rows are kept as Parquet

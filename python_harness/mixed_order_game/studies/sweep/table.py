@@ -10,6 +10,7 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from ...errors import ResultError
+from ...extras import need
 from ...results.metrics import METRIC_UNITS
 from .store import SweepError, read_definition, read_rows
 
@@ -112,10 +113,7 @@ class SweepResult:
 
     def to_pandas(self) -> "pd.DataFrame":
         """The table as a data frame, one row a run."""
-        try:
-            import pandas  # noqa: F401, ICN001 - pyarrow needs it
-        except ImportError as error:
-            raise ResultError("this needs pandas: pip install pandas") from error
+        need("pandas")  # which pyarrow imports by itself
         frame: pd.DataFrame = self.table.to_pandas()
         return frame.set_index("row")
 
