@@ -24,7 +24,7 @@ def judge(text: str, folder: Path, **options: float) -> Validation | GameError:
         fmu = build_fmu(game, folder / "game.fmu")
     except GameError as error:
         return error
-    return validate(fmu, **options)
+    return validate(fmu, **options)  # type: ignore[arg-type]
 
 
 def false_verdicts(validation: Validation | GameError, kind: str) -> list[str]:

@@ -17,6 +17,7 @@ from .fmu.model import read_model as read_model
 from .fmu.run import Simulator as Simulator
 from .fmu.run import run as run
 from .game.check import check_game as check_game
+from .game.game import Game as Game
 from .game.new import Recipe as Recipe
 from .game.new import new_game as new_game
 from .reporting.page import report as report

@@ -13,6 +13,7 @@ EXTRAS = {
     "pandas": "tables",
     "plotly": "report",
     "pyarrow": "parquet",
+    "sympy": "symbols",
     "xarray": "tables",
 }
 

@@ -12,6 +12,7 @@ import tempfile
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import fmpy
 from fmpy.fmi2 import FMU2Slave
@@ -61,7 +62,7 @@ def row(players: int, folder: Path) -> str:
     for k in range(round(stop / STEP)):
         running += _cpu(lambda k=k: slave.doStep(k * STEP, STEP))  # type: ignore[misc]
         values = slave.getReal(outputs)
-        saved = []
+        saved: list[Any] = []
         saving.append(_cpu(lambda saved=saved: saved.append(slave.getFMUstate())))  # type: ignore[misc]
         restoring.append(_cpu(lambda saved=saved: slave.setFMUstate(saved[0])))  # type: ignore[misc]
         if slave.getReal(outputs) != values:

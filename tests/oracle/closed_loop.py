@@ -6,6 +6,7 @@ State vector: x (N D) | z of order 1 or v of order 2 (N D) | y (N N D) | W (N q 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -88,12 +89,12 @@ def signals(game: Game, state: Numbers) -> Signals:
     return Signals(S, gradient, e, nn, phi, u)
 
 
-def _per_entry(value: Numbers | float) -> Numbers | float:
+def _per_entry(value: Numbers | float) -> Any:
     """A number of each player (N, 1), as a factor of arrays (N, D, ...) of three dimensions."""
     return value[..., np.newaxis] if isinstance(value, np.ndarray) else value
 
 
-def _of(value: Numbers | float, players: NDArray[np.int_]) -> Numbers | float:
+def _of(value: Numbers | float, players: NDArray[np.int_]) -> Any:
     """The numbers of some players (K, 1), of each player's (N, 1)."""
     return value[players] if isinstance(value, np.ndarray) else value
 

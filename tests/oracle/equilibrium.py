@@ -41,12 +41,14 @@ def nash_equilibrium(game: Game) -> FloatArray:
     # each gradient in the unit of its second derivatives: no player's scale hides another's residual
     unit = np.abs(jacobian(np.zeros(game.x0.size))).max(axis=1)
     unit[unit == 0.0] = 1.0
-    found = root(
-        lambda x: gradient(x) / unit,
-        np.zeros(game.x0.size),
-        jac=lambda x: jacobian(x) / unit[:, None],
-        tol=1e-14,
-    )
+
+    def scaled(x: FloatArray) -> FloatArray:
+        return gradient(x) / unit
+
+    def scaled_jacobian(x: FloatArray) -> FloatArray:
+        return jacobian(x) / unit[:, None]
+
+    found = root(scaled, np.zeros(game.x0.size), jac=scaled_jacobian, tol=1e-14)
     residual = np.max(np.abs(found.fun))
     if not residual < 1e-10 * (1.0 + np.max(np.abs(gradient(np.zeros(game.x0.size)) / unit))):
         raise ArithmeticError(f"no Nash equilibrium found: {found.message} (residual {residual})")

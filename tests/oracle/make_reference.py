@@ -19,6 +19,7 @@ import sys
 import time
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -109,15 +110,14 @@ def write_tight_sphere() -> None:
     estimate = max(float(np.max(np.abs(getattr(best, k) - getattr(looser, k)))) for k in ("x", "W"))
     if best.switch_count != looser.switch_count or not estimate <= LARGEST_ERROR:
         raise SystemExit(f"tight_sphere: two integrations differ by {estimate:.1e}")
-    arrays = {
+    arrays: dict[str, Any] = {
         "t": best.t,
         "x": best.x,
         "W": best.W,
         "switch_count": np.array(best.switch_count, dtype=np.int32),
     }
-    np.savez_compressed(
-        REFERENCE / "tight_sphere.npz", allow_pickle=False, **arrays, error_estimate=np.array(estimate)
-    )
+    arrays["error_estimate"] = np.array(estimate)
+    np.savez_compressed(REFERENCE / "tight_sphere.npz", allow_pickle=False, **arrays)
     print(f"tight_sphere: {best.switch_count} switches, hundredfold tolerance {estimate:.1e}", flush=True)
 
 

@@ -16,7 +16,7 @@ from pathlib import Path
 import pytest
 
 from fmu_src.platforms import binary_table, build_all, exercise, mach_o, sources
-from fmu_src.platforms.targets import PlatformError, Target
+from fmu_src.platforms.targets import TARGETS, PlatformError, Target
 
 ROOT = Path(__file__).resolve().parents[2]
 CHOSEN = os.environ.get("MIXED_ORDER_GAME_PLATFORMS")
@@ -180,7 +180,7 @@ def test_a_platform_that_fails_is_named_and_the_rest_is_made(
             with zipfile.ZipFile(FOLDER / build_all.ARCHIVE) as archive:
                 parts = ("modelDescription.xml", "extra/")
                 archive.extractall(tmp_path, [n for n in archive.namelist() if n.startswith(parts)])
-            for target in build_all.TARGETS:
+            for target in TARGETS:
                 if target.platform in made():
                     (tmp_path / target.name).symlink_to(FOLDER / target.name)
             from fmpy import __file__ as fmpy_file
@@ -246,7 +246,7 @@ def test_a_universal_library_holds_its_slices_on_whole_pages() -> None:
 def test_a_download_that_is_not_the_expected_one_is_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(sources.urllib.request, "urlopen", lambda *_args, **_options: io.BytesIO(b"another"))
+    monkeypatch.setattr("urllib.request.urlopen", lambda *_args, **_options: io.BytesIO(b"another"))
     monkeypatch.setattr(subprocess, "run", None)  # and no other way is tried
     with pytest.raises(PlatformError, match="SHA-256"):
         sources.sources(sources.SUNDIALS, tmp_path)

@@ -238,6 +238,7 @@ def test_analysis_of_the_example(fmu: Path) -> None:
     assert any("Yet the run" in verdict for verdict in found.verdicts)
     assert "for k3 from 2.04 to 5e+04 1/s" in found.verdicts[0]
     # k2 = 1 exceeds k2* = 0.76, so the thresholds after it are for k2 = 1; k1* = l^2 k2^2 N / 2 + l k2 / 2.
+    assert found.constants is not None
     lipschitz = found.constants.largest_lipschitz
     assert found.value("theorem 2", "k1*") == pytest.approx(2.5 * lipschitz**2 + 0.5 * lipschitz)
     assert "k1 = 10, k1* = 386.2 1/s for k2 = 1)" in found.verdicts[1]

@@ -4,6 +4,7 @@ import io
 import re
 import zipfile
 from pathlib import Path
+from typing import Any, cast
 
 import fmpy
 import pytest
@@ -15,7 +16,7 @@ from tests.conftest import GAMES, FmuOf
 
 BINARY = "binaries/linux64/MixedOrderGame.so"
 NEEDED = re.compile(r"(libc|libm|ld-linux[\w-]*)\.so\.\d+")
-FMI2 = Path(__import__("fmpy").__file__).parent / "c-code" / "fmi2Functions.h"
+FMI2 = Path(str(fmpy.__file__)).parent / "c-code" / "fmi2Functions.h"
 
 
 @pytest.fixture(scope="module")
@@ -30,7 +31,7 @@ def test_fmpy_finds_nothing(name: str, fmu_of: FmuOf) -> None:
 
 
 def test_exports_every_fmi_function_and_nothing_else(binary: ELFFile) -> None:
-    symbols = binary.get_section_by_name(".dynsym").iter_symbols()
+    symbols = cast("Any", binary.get_section_by_name(".dynsym")).iter_symbols()
     exported = {
         symbol.name
         for symbol in symbols
@@ -42,7 +43,7 @@ def test_exports_every_fmi_function_and_nothing_else(binary: ELFFile) -> None:
 
 
 def test_needs_only_the_c_library(binary: ELFFile) -> None:
-    tags = binary.get_section_by_name(".dynamic").iter_tags()
+    tags = cast("Any", binary.get_section_by_name(".dynamic")).iter_tags()
     needed = [tag.needed for tag in tags if tag.entry.d_tag == "DT_NEEDED"]
     assert [name for name in needed if not NEEDED.fullmatch(name)] == []
 

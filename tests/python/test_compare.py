@@ -37,7 +37,7 @@ def test_runs(compared: Comparison) -> None:
 
 def test_baselines_leave_out_what_they_say(fmu: Path) -> None:
     for values, network, phi in (({"beta": 0.0}, False, True), ({"delta": 0.0}, True, False)):
-        result = run(fmu, start_values=values, stop_time=1.0)  # type: ignore[arg-type]
+        result = run(fmu, start_values=values, stop_time=1.0)
         assert (np.abs(result.nn).max() > 0.0) == network
         assert (np.abs(result.W_norm2).max() > 0.0) == network
         assert (np.abs(result.phi).max() > 0.0) == phi

@@ -100,9 +100,11 @@ def test_equilibrium_is_that_of_the_costs_in_the_literature(
 ) -> None:
     players, dimension, cost = LITERATURE[name]
     shape = (players, dimension)
-    found = root(
-        lambda x: own_gradients(cost, x.reshape(shape)).ravel(), np.zeros(players * dimension), tol=1e-12
-    )
+
+    def gradients(x: FloatArray) -> FloatArray:
+        return own_gradients(cost, x.reshape(shape)).ravel()
+
+    found = root(gradients, np.zeros(players * dimension), tol=1e-12)
     assert np.abs(found.fun).max() < 1e-9
     expected = found.x.reshape(shape)
     np.testing.assert_allclose(nash_equilibrium(read_game(GAMES / f"{name}.toml")), expected, atol=1e-9)

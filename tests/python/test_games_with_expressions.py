@@ -6,6 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
+from scipy.optimize import root
 from typer.testing import CliRunner, Result
 
 import mixed_order_game as mog
@@ -21,7 +23,14 @@ from mixed_order_game.studies.validate import validate
 from mixed_order_game.theory.analysis import analyse
 from mixed_order_game.theory.constants import dynamics_constants, loop_constants
 from mixed_order_game.theory.game import read_game
-from mixed_order_game.theory.spectrum import linear_loop, monotonicity_constant, nash_equilibrium
+from mixed_order_game.theory.linearized import gradient_jacobian, linearized_loop
+from mixed_order_game.theory.spectrum import (
+    gradient_map,
+    linear_loop,
+    monotonicity_constant,
+    nash_equilibrium,
+    spectral_abscissa,
+)
 
 HEAD = """
 title = "Three sellers with exponential demand"
@@ -90,18 +99,95 @@ def fmu(game: Path) -> Path:
     return build_fmu(game, game.with_suffix(".fmu"))
 
 
-def test_the_analysis_refuses(game: Path, fmu: Path) -> None:
-    told = f"the analysis reads costs, dynamics and disturbances as coefficients; {COST}"
-    for call in (
-        lambda: analyse(game, simulation=False),
-        lambda: analyse(game, simulation=False, square=False),
-        lambda: analyse(fmu),
-        lambda: read_game(fmu),
-    ):
-        with pytest.raises(mog.GameError, match=told):
-            call()
-    refused = command("analyse", game, "--no-simulation")
-    assert (refused.exit_code, refused.stderr) == (1, f"mog: {told}\n")
+def unperturbed_rates(state: NDArray[np.float64], price: float, k3: float) -> NDArray[np.float64]:
+    """Rates of (x | z_1 | v_2, v_3 | y) by the paper's equations and the costs' derivatives, by hand."""
+    x, z, v, y = state[:3], state[3], state[4:6], state[6:].reshape(3, 3)
+    own = np.diag(y)
+    demand = np.exp(-0.1 * y.sum(axis=1))
+    gradient = 2.0 * (own - np.array([5.0, 7.0, 6.0])) - price * demand * (1.0 - 0.1 * own)
+    shared = np.array([z, x[1], x[2]])
+    a = np.ones((3, 3)) - np.eye(3)
+    y_rate = [
+        [-k3 * (a[i] @ (y[i, j] - y[:, j]) + a[i, j] * (y[i, j] - shared[j])) for j in range(3)]
+        for i in range(3)
+    ]
+    first = [-10.0 * (x[0] - z), v[0], v[1], -gradient[0]]
+    return np.concatenate([first, -20.0 * v - 20.0 * gradient[1:], np.ravel(y_rate)])
+
+
+def linearization_by_hand(price: float, k3: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """x* by a root of the gradients and M by central differences at it."""
+
+    def gradients(x: NDArray[np.float64]) -> NDArray[np.float64]:
+        return unperturbed_rates(np.concatenate([x, x[:1], [0.0, 0.0], np.tile(x, 3)]), price, k3)[3:6]
+
+    x = root(gradients, np.full(3, 5.0), tol=1e-14).x
+    rest = np.concatenate([x, x[:1], [0.0, 0.0], np.tile(x, 3)])
+    steps = 1e-5 * np.eye(len(rest))
+    columns = [
+        (unperturbed_rates(rest + step, price, k3) - unperturbed_rates(rest - step, price, k3)) / 2e-5
+        for step in steps
+    ]
+    return x, np.array(columns).T
+
+
+@pytest.mark.parametrize("changes", [{}, {"price": 40.0, "k3": 2.0}])
+def test_the_loop_is_linearized_as_by_hand(changes: dict[str, float], fmu: Path) -> None:
+    x_star, by_hand = linearization_by_hand(changes.get("price", 12.0), changes.get("k3", 50.0))
+    with mog.Simulator(fmu) as simulator:
+        loop = linearized_loop(simulator, changes)
+        jacobian = gradient_jacobian(loop, simulator.model, simulator.model.start_values(changes))
+    np.testing.assert_allclose(loop.x_star.ravel(), x_star, rtol=1e-10)
+    assert loop.states[:6] == ("x[1,1]", "x[2,1]", "x[3,1]", "z[1,1]", "v[2,1]", "v[3,1]")
+    np.testing.assert_allclose(loop.matrix, by_hand, atol=1e-7)
+    assert loop.abscissa == pytest.approx(np.linalg.eigvals(by_hand).real.max(), rel=1e-6)
+    np.testing.assert_allclose(jacobian[0], -by_hand[3, 6:9], atol=1e-7)
+    np.testing.assert_allclose(jacobian[2], -by_hand[5, 12:15] / 20.0, atol=1e-7)
+
+
+@pytest.mark.parametrize("name", ["five_vehicles", "opinion_formation"])
+def test_of_a_quadratic_game_it_is_the_loop_itself(name: str) -> None:
+    with mog.Simulator(name) as simulator:
+        parameters = game_parameters(simulator.model)
+        loop = linearized_loop(simulator)
+        jacobian = gradient_jacobian(loop, simulator.model, simulator.model.start_values())
+    alike = np.eye(parameters.dimension)
+    np.testing.assert_allclose(loop.x_star, nash_equilibrium(parameters), rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(jacobian, np.kron(gradient_map(parameters), alike), atol=1e-9)
+    assert loop.abscissa == pytest.approx(spectral_abscissa(linear_loop(parameters)), rel=1e-6)
+
+
+def test_the_analysis_is_of_the_loop_near_the_equilibrium(game: Path, fmu: Path) -> None:
+    found = analyse(game)
+    _, by_hand = linearization_by_hand(12.0, 50.0)
+    rate = -np.linalg.eigvals(by_hand).real.max()
+    assert found.value("local", "slowest rate") == pytest.approx(rate, rel=1e-6)
+    assert found.value("local", "stable") is True
+    assert found.verdicts[0].endswith("and holds near x* alone.")
+    assert analyse(fmu, changes={"k3": 0.01}).value("local", "stable") is False
+    shown = command("analyse", game, "--json")
+    assert json.loads(shown.stdout)["constants"] is None
+    assert "near x*" in command("analyse", game, "--tables").stdout
+    refused = command("analyse", game, "--no-square")
+    assert refused.exit_code == 1
+    assert f"only coefficients have a square term to remove; {COST}" in refused.stderr
+    with pytest.raises(mog.GameError, match="the analysis reads costs, dynamics and disturbances as coeff"):
+        read_game(fmu)
+
+
+def test_near_the_equilibrium_a_run_decays_at_that_rate(fmu: Path) -> None:
+    with mog.Simulator(fmu) as simulator:
+        loop = linearized_loop(simulator)
+        eigenvalues, vectors = np.linalg.eig(loop.matrix)
+        slowest = vectors[:, np.argmax(eigenvalues.real)].real
+        near: dict[str, float] = {}
+        for name, part in zip(loop.states, 1e-3 * slowest / np.abs(slowest).max(), strict=True):
+            rest = 0.0 if name.startswith("v") else loop.x_star[int(name.split(",")[-2][-1]) - 1, 0]
+            near[name.replace("[", "0[")] = rest + part
+        off = {**near, "robust": False, "perturbed": False}
+        run = simulator.run(start_values=off, stop_time=2.0, tolerance=1e-12)
+    slope = np.polyfit(run.time, np.log(run.nash_error), 1)[0]
+    assert slope == pytest.approx(loop.abscissa, rel=1e-3)
 
 
 @pytest.mark.parametrize(
@@ -150,6 +236,7 @@ def test_validate_judges_what_it_can(fmu: Path) -> None:
     for name in ("theorem_2_stability", "theorem_2_convergence"):
         assert verdicts[name].verdict is Verdict.NOT_COVERED
         assert "player 1's cost has an expression" in verdicts[name].reason
+    assert "it is exponentially stable near x*" in verdicts["theorem_2_stability"].reason
     assert verdicts["lemma_3_weights"].verdict is Verdict.HOLDS
     assert "No bound explains the neighbourhood: player 1's cost has an expression" in found.notes[0]
     for name in ("actions", "velocities", "estimates"):
@@ -235,6 +322,7 @@ def test_defaults_of_coefficients_are_analysed(tmp_path: Path) -> None:
     path = tmp_path / "defaults.toml"
     path.write_text(HEAD + QUADRATIC % "quadratic = 0.7", encoding="utf-8")
     found = analyse(path, simulation=False, square=False)
+    assert found.constants is not None
     assert found.constants.monotonicity == pytest.approx(1.4)
 
 
@@ -257,4 +345,4 @@ def test_the_report_shows_the_expression_and_says_what_is_missing(fmu: Path, tmp
     text = page.read_text(encoding="utf-8")
     assert "<th>expression</th>" in text
     assert "price * x[i] * exp(-0.1" in text
-    assert "No rate is predicted: player 1&#39;s cost has an expression" in text
+    assert "for near x* alone: player 1&#39;s cost has an expression" in text

@@ -67,7 +67,7 @@ def test_algebraic_connectivity() -> None:
 
 
 def test_networkx_weights() -> None:
-    graph = nx.Graph()
+    graph: nx.Graph[str] = nx.Graph()
     graph.add_edge("b", "a", weight=2.0)
     graph.add_edge("a", "c")
     assert from_networkx(graph) == CommunicationGraph(3, ((1, 2, 2.0), (2, 3, 1.0)))

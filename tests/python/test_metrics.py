@@ -126,7 +126,7 @@ def test_settings_that_make_no_sense(wrong: dict[str, float]) -> None:
     from mixed_order_game import SimulationError
 
     with pytest.raises(SimulationError, match=next(iter(wrong))):
-        Settings(**wrong)  # type: ignore[arg-type]
+        Settings(**wrong)
 
 
 def test_changed_values(fmu: Path) -> None:

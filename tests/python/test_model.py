@@ -66,7 +66,7 @@ def test_names_without_indices_set_all_of_their_kind(fmu: Path) -> None:
 def test_no_name_is_proposed_twice(text: str, fmu: Path) -> None:
     for look_up in (read_model(fmu).variable, lambda name: read_model(fmu).select([name])):
         with pytest.raises(VariableError) as told:
-            look_up(text)  # type: ignore[operator]
+            look_up(text)
         proposed = str(told.value).partition("did you mean ")[2].rstrip("?").split(" or ")
         assert len(proposed) == len(set(proposed))
 

@@ -104,15 +104,17 @@ def changed_costs() -> Result:
 def test_the_equilibrium_is_drawn_as_it_was_at_each_time() -> None:
     axes = plot.plot_positions(changed_costs())
     levels = [line for line in axes.lines if str(line.get_label()).startswith("_")]
-    assert sorted((line.get_ydata()[0], line.get_ydata()[-1]) for line in levels) == [
-        (-0.5, -0.5),
-        (-0.5, 1.0),
-    ]
-    moved = max(levels, key=lambda line: line.get_ydata()[-1])
+    values = [np.asarray(line.get_ydata()) for line in levels]
+    assert sorted((each[0], each[-1]) for each in values) == [(-0.5, -0.5), (-0.5, 1.0)]
+    moved, drawn = max(zip(levels, values, strict=True), key=lambda pair: float(pair[1][-1]))
     assert moved.get_drawstyle() == "steps-pre"  # a change acts from its sample on, shown by the next one
-    assert list(moved.get_ydata()[100:102]) == [-0.5, 1.0]
+    assert drawn[100:102].tolist() == [-0.5, 1.0]
     plane = plot.plot_plane(changed_costs())
-    crosses = {str(line.get_color()): line.get_xydata() for line in plane.lines if line.get_marker() == "x"}
+    crosses = {
+        str(line.get_color()): np.asarray(line.get_xydata())
+        for line in plane.lines
+        if line.get_marker() == "x"
+    }
     np.testing.assert_array_equal(crosses[plot.EARLIER], [[-0.5, -0.5]])
     assert [1.0, 1.0] in crosses["black"].tolist()
     assert "equilibrium before" in legend_texts(plane)

@@ -86,9 +86,9 @@ def test_tables_that_are_no_tables(content: bytes, told: str, fmu: Path, tmp_pat
         load(table)
     assert str(error.value).startswith(f"{table} is not a result of this package: {told}")
     if "''" not in told:
-        with pytest.raises(MixedOrderGameError, match=r"table\.csv") as error:
+        with pytest.raises(MixedOrderGameError, match=r"table\.csv") as refused:
             read_disturbance(table, read_model(fmu))
-        assert told in str(error.value)
+        assert told in str(refused.value)
 
 
 @pytest.mark.parametrize(
@@ -136,6 +136,6 @@ def test_what_is_no_file_is_told_in_words(tmp_path: Path) -> None:
             (long, f"{long} cannot be read: file name too long"),
         ):
             with pytest.raises(kind) as error:
-                read(path, *arguments)  # type: ignore[operator]
+                read(path, *arguments)
             assert str(error.value).startswith(told)
             assert "rrno" not in str(error.value)

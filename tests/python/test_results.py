@@ -3,6 +3,7 @@
 import csv
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -21,7 +22,7 @@ ORDER = (1, 2, 1)
 
 def make(**options: object) -> Result:
     rng = np.random.default_rng(3)
-    columns = {}
+    columns: dict[str, Any] = {}
     for i in range(1, N + 1):
         for coordinate in range(1, D + 1):
             index = f"[{i},{coordinate}]"

@@ -143,7 +143,7 @@ def test_a_limit_that_is_too_short_settles_nothing(fmu_of: FmuOf, fmu: Path) -> 
     assert not validation.holds
     for name, value in (("limit", 0.0), ("limit", np.nan), ("neighbourhood", -1.0)):
         with pytest.raises(SimulationError, match=f"{name} = .* is not positive"):
-            validate(fmu, **{name: value})
+            validate(fmu, **{name: value})  # type: ignore[arg-type]
 
 
 def test_a_neighbourhood_of_ones_own(fmu_of: FmuOf) -> None:

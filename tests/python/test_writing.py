@@ -190,7 +190,7 @@ def test_suffixes_that_no_command_reads(
     assert game.read_bytes() == default_game().read_bytes()
 
 
-COMMANDS = {
+COMMANDS: dict[str, list[object]] = {
     "a.fmu": ["build", "--output", "{folder}/a.fmu"],
     "run.csv": ["run", "{fmu}", "--stop-time", 0.1, "--output", "{folder}/run.csv"],
     "report.html": ["report", "{run}", "--output", "{folder}/report.html"],

@@ -26,7 +26,8 @@ def print_analysis(analysis: Analysis, console: Console | None = None, *, tables
                 unit = "" if row.unit == "1" else row.unit
                 table.add_row(Text(row.name), Text(_plain(row.value)), unit, Text(row.meaning))
         show(table, console)
-    show(_hypotheses("Theorem 1 for the given gains", analysis.hypotheses), console)
+    if analysis.hypotheses:
+        show(_hypotheses("Theorem 1 for the given gains", analysis.hypotheses), console)
     for each in analysis.demonstrations:
         show(_hypotheses(f"Theorem 1 for the design by {each.name}", each.hypotheses), console)
 

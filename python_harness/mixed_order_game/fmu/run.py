@@ -311,6 +311,43 @@ class Simulator:
             raise SimulationError(self._said() or str(error)) from error
         return tuple(message for _, message in self._messages)
 
+    @in_turn
+    def at_start(self, names: Sequence[str], values: Mapping[str, Value]) -> NDArray[np.float64]:
+        """Real variables (n,) right after initialization with these start values."""
+        block = Block([self.model.variable(name) for name in names], 1)
+        with self._initialized(values) as slave:
+            block.reader(slave)(0)
+        return block.values[0]
+
+    @in_turn
+    def jacobian(self, states: Sequence[str], values: Mapping[str, Value]) -> NDArray[np.float64]:
+        """Derivatives (n, n) in 1/s of the rates of some states along them, after such an initialization.
+
+        Entry [a, b] is the derivative of der(states[a]) along states[b].
+        """
+        rates = [self.model.variable(f"der({name})").reference for name in states]
+        columns = []
+        with self._initialized(values) as slave:
+            for name in states:
+                reference = self.model.variable(name).reference
+                columns.append(slave.getDirectionalDerivative(rates, [reference], [1.0]))
+        return np.array(columns, dtype=np.float64).reshape(len(states), len(states)).T
+
+    @contextmanager
+    def _initialized(self, values: Mapping[str, Value]) -> Iterator[Any]:
+        """The instance at the start of a run; what the FMU refuses becomes SimulationError."""
+        if self._slave is None:
+            raise SimulationError("the simulator is closed")
+        start = self.model.expanded(values)
+        checked = {name: check_value(self.model.variable(name), value) for name, value in start.items()}
+        try:
+            self._initialize(checked, [0.0, self.model.stop_time], self.model.tolerance)
+            self._slave.exitInitializationMode()
+            yield self._slave
+            self._slave.terminate()
+        except FMICallException as error:
+            raise SimulationError(self._said() or str(error)) from error
+
     def result(
         self,
         time: NDArray[np.float64],

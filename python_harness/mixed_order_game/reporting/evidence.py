@@ -7,17 +7,18 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import ResultError
+from ..errors import ModelError, ResultError, SimulationError
 from ..fmu.model import Model, Value
 from ..fmu.run import Simulator
 from ..game.definition import has_expressions
-from ..game.parameters import game_parameters
+from ..game.parameters import GameParameters, game_parameters
 from ..names import parse_name
 from ..results.result import Result
 from ..results.unknown_term import UNKNOWN, recorded_for_unknown_term, unknown_term
 from ..studies.claims.tolerances import PLAIN_TOLERANCE, TOLERANCE
 from ..studies.claims.unperturbed_loop import LARGEST_LINEAR_LOOP
 from ..studies.validate import Validation, validate
+from ..theory.linearized import linearized_loop
 from ..theory.spectrum import linear_loop, spectral_abscissa
 from ..times import in_seconds
 
@@ -56,6 +57,24 @@ class Evidence:
     def passed(self) -> bool:
         """Whether no claim fails."""
         return self.validation is None or self.validation.passed
+
+
+def _predicted_rate(
+    simulator: Simulator, game: GameParameters, changes: Mapping[str, Value]
+) -> tuple[float | None, list[str]]:
+    """Spectral abscissa of the unperturbed loop in 1/s, and what there is to be told of it."""
+    cost = has_expressions(game.expressions, "cost")
+    if cost:
+        try:
+            abscissa = linearized_loop(simulator, changes).abscissa
+        except (ModelError, SimulationError) as error:
+            return None, [f"No rate is predicted: {cost}, and {error}."]
+        return abscissa, [
+            f"The predicted rate is that of the loop linearized at x*, for near x* alone: {cost}."
+        ]
+    if game.players > LARGEST_LINEAR_LOOP:
+        return None, [f"No rate is predicted: the linear loop of {game.players} players is too large."]
+    return spectral_abscissa(linear_loop(game)), []
 
 
 def evidence_of_game(
@@ -97,14 +116,8 @@ def evidence_of_game(
         result = simulate("run", changes or {}, TOLERANCE, estimates=estimates)
         off = {**(changes or {}), "robust": False, "perturbed": False}
         plain = simulate("unperturbed run", off, PLAIN_TOLERANCE, estimates=False)
-    abscissa = None
-    cost = has_expressions(game.expressions, "cost")
-    if cost:
-        notes.append(f"No rate is predicted: {cost}, and the unperturbed loop is not linear.")
-    elif game.players <= LARGEST_LINEAR_LOOP:
-        abscissa = spectral_abscissa(linear_loop(game))
-    else:
-        notes.append(f"No rate is predicted: the linear loop of {game.players} players is too large.")
+        abscissa, note = _predicted_rate(simulator, game, changes or {})
+        notes += note
     if not estimates:
         many = f"there are N^2 D of them, and N = {model.players} exceeds {MOST_ESTIMATING}"
         why = many if model.players > MOST_ESTIMATING else "the FMU does not expose them"

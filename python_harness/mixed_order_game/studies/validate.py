@@ -9,13 +9,14 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from ..errors import SimulationError
+from ..errors import ModelError, SimulationError
 from ..fmu.model import Model
 from ..fmu.run import Progress, Simulator
 from ..game.definition import has_expressions
 from ..game.parameters import GameParameters, game_parameters
 from ..results.result import Result
 from ..results.unknown_term import UNKNOWN, FloatArray, recorded_for_unknown_term
+from ..theory.linearized import linearized_loop
 from .claims.archive import archive_valid
 from .claims.early_end import Ended, run_or_end
 from .claims.equilibrium import nash_equilibrium_exists
@@ -139,7 +140,7 @@ def validate(
             plain, spectrum = run_until_decay_is_seen(simulator, game, spectrum, limit, progress)
         else:
             plain = unperturbed_run(simulator, game, spectrum, progress=progress)
-        stability = unperturbed_loop_stable(game, spectrum)
+        stability = unperturbed_loop_stable(game, spectrum, _local_abscissa(simulator, game))
         convergence = unperturbed_actions_converge(game, spectrum, plain)
         robust = _default_experiment(simulator, game, progress)
         observed = None
@@ -161,6 +162,16 @@ def validate(
         robust=robust if isinstance(robust, Result) else None,
         plain=plain if isinstance(plain, Result) else None,
     )
+
+
+def _local_abscissa(simulator: Simulator, game: GameParameters) -> float | None:
+    """Of the loop linearized at x*, in 1/s, where a cost has an expression; None where it cannot be had."""
+    if not has_expressions(game.expressions, "cost"):
+        return None
+    try:
+        return linearized_loop(simulator).abscissa
+    except (ModelError, SimulationError):  # too large, or no estimates to linearize along
+        return None
 
 
 def _default_experiment(
@@ -229,9 +240,10 @@ def _notes(game: GameParameters) -> list[str]:
 
 
 def _equilibrium_of(simulator: Simulator) -> FloatArray:
-    """x* (N, D) of the FMU, from a run that hardly begins."""
-    moment = 1e-6 * simulator.model.stop_time
-    return simulator.run(stop_time=moment, step=moment, outputs=["x", "x_star"]).x_star
+    """x* (N, D) of the FMU."""
+    model = simulator.model
+    names = [variable.name for _, variable in sorted(model.indexed("x_star").items())]
+    return simulator.at_start(names, {}).reshape(model.players, model.dimension)
 
 
 def _runs(observed: Observed | None) -> list[PerturbedRun]:

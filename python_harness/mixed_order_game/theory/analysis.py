@@ -7,13 +7,15 @@ from pathlib import Path
 
 from ..arguments import number_argument
 from ..errors import BuildError, GameError
-from ..files.reading import suffix_of
+from ..files.reading import ReadError, expect_file, read_text, suffix_of, toml_of
 from ..files.temporary import temporary_folder
 from ..fmu.build import build_fmu, cached_fmu, source_of
-from ..fmu.model import Value
+from ..fmu.model import Value, read_model
+from ..game.definition import expressions_of, has_expressions, with_defaults
 from .analyst import Analyst, Progress
 from .findings import Analysis
 from .game import AnalysedGame, game_from_tables, read_game, toml_text, without_square
+from .local_analysis import local_analysis
 
 
 def analyse(
@@ -34,13 +36,32 @@ def analyse(
 
     Raises GameError, ModelError, BuildError, VariableError or SimulationError as reading, building and
     running do; GameError if the game has no unique Nash equilibrium or radius is not positive.
+
+    Of a game with expressions, the loop linearized at x* alone is analysed; simulation and radius do nothing.
     """
     radius = number_argument(radius, "radius", GameError)
     if not (math.isfinite(radius) and radius > 0.0):
         raise GameError(f"radius = {radius:g} is not positive")
     source = source_of(game)
+    expression = _expression_in(source)
+    if expression:
+        if not square:
+            raise GameError(f"{source}: only coefficients have a square term to remove; {expression}")
+        fmu = source if suffix_of(source) == ".fmu" else cached_fmu(source)
+        return local_analysis(fmu, source, changes or {})
     with _opened(source, changes, simulation=simulation, square=square) as (analysed, fmu):
         return Analyst(analysed, fmu, changes or {}, radius, progress).analysis(source)
+
+
+def _expression_in(path: Path) -> str | None:
+    """Whose cost, dynamics or disturbance has an expression; None also for files that are no games."""
+    if suffix_of(path) == ".fmu":
+        return has_expressions(read_model(path).expressions)
+    expect_file(path, "game file", GameError)
+    try:
+        return has_expressions(expressions_of(with_defaults(toml_of(read_text(path)))))
+    except (ReadError, KeyError, TypeError, AttributeError):  # read_game tells what is wrong with it
+        return None
 
 
 @contextmanager

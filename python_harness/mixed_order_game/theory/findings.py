@@ -58,8 +58,8 @@ class Analysis:
     hypotheses: tuple[Hypothesis, ...]  # of Theorem 1, for the game's own gains
     demonstrations: tuple[Demonstration, ...]
     verdicts: tuple[str, ...]
-    constants: LoopConstants
-    exact: ExactLoop | None  # None for games too large for the dense loop
+    constants: LoopConstants | None  # None for games with expressions
+    exact: ExactLoop | None  # None for games too large for the dense loop, or with expressions
     runs: Mapping[str, Seen]  # "robust" and "plain", with the game's own gains
 
     def value(self, section: str, name: str) -> Figure:
@@ -79,7 +79,9 @@ class Analysis:
         return {
             "title": self.title,
             "game": str(self.path),
-            "constants": {
+            "constants": None
+            if c is None
+            else {
                 "monotonicity": c.monotonicity,
                 "lipschitz": c.lipschitz.tolist(),
                 "hessian_norm": c.hessian_norm,

@@ -79,20 +79,22 @@ def spectrum_of(game: GameParameters) -> Spectrum:
     return Spectrum(abscissa, marginal=marginal, slowest_rate=max(0.0, -abscissa))
 
 
-def unperturbed_loop_stable(game: GameParameters, spectrum: Spectrum) -> Claim:
-    """All eigenvalues have negative real parts."""
-    abscissa = spectrum.abscissa
+def unperturbed_loop_stable(game: GameParameters, spectrum: Spectrum, local: float | None = None) -> Claim:
+    """All eigenvalues have negative real parts.
+
+    Where a cost has an expression, local is the spectral abscissa in 1/s of the loop linearized at x*: a
+    positive one refutes the claim, a negative one does not prove it.
+    """
+    expression = has_expressions(game.expressions, "cost")
+    abscissa = local if expression else spectrum.abscissa
 
     def claim(verdict: Verdict, reason: str) -> Claim:
         statement = "Theorem 2: the unperturbed loop is exponentially stable"
         figures = {} if abscissa is None else {"abscissa": abscissa}
         return Claim("theorem_2_stability", statement, verdict, reason, figures)
 
-    expression = has_expressions(game.expressions, "cost")
     if expression:
-        return claim(
-            Verdict.NOT_COVERED, f"The loop is not linear, {expression}: it has no eigenvalues to judge."
-        )
+        return claim(*_judged_near(local, expression))
     if abscissa is None:
         states = 2 * game.players + game.players**2
         reason = f"The linear loop has {states:,} states a coordinate, too many for its eigenvalues."
@@ -102,6 +104,20 @@ def unperturbed_loop_stable(game: GameParameters, spectrum: Spectrum) -> Claim:
     if spectrum.unstable:
         return claim(Verdict.FAILS, f"The spectral abscissa is {abscissa:.4g} 1/s: a mode grows.")
     return claim(Verdict.HOLDS, f"The spectral abscissa is {abscissa:.4g} 1/s.")
+
+
+def _judged_near(local: float | None, expression: str) -> tuple[Verdict, str]:
+    """Of a loop that is not linear, because of an expression."""
+    if local is None:
+        return Verdict.NOT_COVERED, f"The loop is not linear, {expression}: it has no eigenvalues to judge."
+    told = (
+        f"The loop is not linear, {expression}; linearized at x* its spectral abscissa is {local:.4g} 1/s: "
+    )
+    if local > 0.0:
+        return Verdict.FAILS, told + "a mode grows there."
+    return Verdict.NOT_COVERED, told + (
+        "it is exponentially stable near x*." if local < 0.0 else "zero to rounding, which decides nothing."
+    )
 
 
 def unperturbed_run(
