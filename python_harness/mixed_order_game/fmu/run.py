@@ -317,7 +317,7 @@ class Simulator:
         block = Block([self.model.variable(name) for name in names], 1)
         with self._initialized(values) as slave:
             block.reader(slave)(0)
-        return block.values[0]
+        return np.asarray(block.values[0], dtype=np.float64)
 
     @in_turn
     def jacobian(self, states: Sequence[str], values: Mapping[str, Value]) -> NDArray[np.float64]:

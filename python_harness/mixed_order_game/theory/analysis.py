@@ -47,8 +47,8 @@ def analyse(
     if expression:
         if not square:
             raise GameError(f"{source}: only coefficients have a square term to remove; {expression}")
-        fmu = source if suffix_of(source) == ".fmu" else cached_fmu(source)
-        return local_analysis(fmu, source, changes or {})
+        file = source if suffix_of(source) == ".fmu" else cached_fmu(source)
+        return local_analysis(file, source, changes or {})
     with _opened(source, changes, simulation=simulation, square=square) as (analysed, fmu):
         return Analyst(analysed, fmu, changes or {}, radius, progress).analysis(source)
 
