@@ -116,14 +116,14 @@ CommunicationGraph read_graph(const TomlEntry& table, const Shape& shape) {
   const auto apart = shape.hosts_all() ? graph.not_reached() : std::nullopt;
   if (apart && directed) {
     throw GameError(edges.path() + " lets nothing of player " + std::to_string(apart->first + 1) + " reach player " +
-                    std::to_string(apart->second + 1) + ", expected a strongly connected graph",
+                        std::to_string(apart->second + 1) + ", expected a strongly connected graph",
                     edges.path());
   }
   if (apart) {
     const auto components = graph.components();
-    throw GameError(edges.path() + " leaves the players in separate groups " + groups(components) +
-                    ", expected a connected graph",
-                    edges.path());
+    throw GameError(
+        edges.path() + " leaves the players in separate groups " + groups(components) + ", expected a connected graph",
+        edges.path());
   }
   require_moderate_factors(graph);
   return graph;

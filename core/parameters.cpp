@@ -20,8 +20,9 @@ void require_bounded_weights(const Parameters& parameters) {
       }
       if (norm2 <= W_max * (1.0 + excess)) continue;
       throw GameError("the initial weights W0 of player " + std::to_string(i + 1) + ", coordinate " +
-                      std::to_string(l + 1) + ", have the squared norm " + text_of(norm2) +
-                      ", expected at most W_max, " + text_of(W_max));
+                          std::to_string(l + 1) + ", have the squared norm " + text_of(norm2) +
+                          ", expected at most W_max, " + text_of(W_max),
+                      "player[" + std::to_string(i + 1) + "].W0");
     }
   }
 }
