@@ -12,8 +12,9 @@ from mixed_order_game.studies.claims.verdict import Verdict
 from mixed_order_game.studies.tune import TuneError, tune
 from mixed_order_game.studies.validate import validate
 from mixed_order_game.theory import spectrum
-from mixed_order_game.theory.analysis import Analysis, analyse
+from mixed_order_game.theory.analysis import analyse
 from mixed_order_game.theory.constants import loop_constants
+from mixed_order_game.theory.findings import Analysis
 from mixed_order_game.theory.game import game_from_tables
 from mixed_order_game.theory.lyapunov import identity_right_side
 from tests.oracle import linear_loop
