@@ -1,5 +1,6 @@
 """FMUs of some players and of external plants: what they hold, and parts against the whole."""
 
+import ctypes
 import tomllib
 import zipfile
 from collections.abc import Callable, Collection, Mapping, Sequence
@@ -223,7 +224,7 @@ class Coupled:
         return values
 
 
-_pointer = np.ctypeslib.ctypes.POINTER(np.ctypeslib.ctypes.c_double)
+_pointer = ctypes.POINTER(ctypes.c_double)
 
 
 def integrated(fmus: Sequence[Path], folder: Path, stop: float, names: Collection[str]) -> dict[str, float]:

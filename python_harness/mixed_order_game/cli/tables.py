@@ -55,10 +55,10 @@ def print_info(model: Model, *, variables: bool = False) -> None:
             table.add_row(*map(Text, row))
         show(table, console)
 
-    told = sources(model)
-    if told:
+    origins = sources(model)
+    if origins:
         table = Table("values", "variables", "source", box=LINES)
-        for source in told:
+        for source in origins:
             table.add_row(source.group, ", ".join(source.names), source.source)
         show(table, console)
 
