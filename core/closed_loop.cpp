@@ -100,13 +100,13 @@ Plants ClosedLoop::plants(const Real* state, const Real* inputs, Signals& signal
   return {signals.actions.data(), signals.references.data()};
 }
 
-void ClosedLoop::evaluate_errors(const Real* state, const Real* inputs, Signals& signals) const {
+void ClosedLoop::evaluate_errors(const Real* state, const Real* inputs, const Modes& modes, Signals& signals) const {
   const auto& [shape, gains, strategy, rbf, graph, cost, dynamics, disturbance, initial, named, guess] = parameters_;
   const auto [x, reference] = plants(state, inputs, signals);
   Real* e = signals.error.data();
   const Real* gradient = signals.gradient.data();
 
-  cost->own_gradients(state + layout_.estimates(), shape.actions(), signals.gradient.data());
+  cost->own_gradients(state + layout_.estimates(), shape.actions(), signals.gradient.data(), held(0, modes));
   for (std::size_t p = 0; p < own_.size(); ++p) {
     const std::size_t k = at(own_[p].entry);
     signals.shared[k] = terms::shared_signal(own_[p].second, x[k], reference[k]);
@@ -143,8 +143,8 @@ void ClosedLoop::evaluate_network(const Real* state, Signals& signals) const {
                          signals.network.data());
 }
 
-void ClosedLoop::evaluate_seeking(const Real* state, const Real* inputs, Signals& signals) const {
-  evaluate_errors(state, inputs, signals);
+void ClosedLoop::evaluate_seeking(const Real* state, const Real* inputs, const Modes& modes, Signals& signals) const {
+  evaluate_errors(state, inputs, modes, signals);
   if (parameters_.strategy.robust) {
     evaluate_network(state, signals);
     evaluate_robust_term(signals);
@@ -167,7 +167,7 @@ void ClosedLoop::evaluate(Real t, const Real* state, const Real* inputs, const M
   Real* g = signals.dynamics.data();
   Real* d = signals.disturbance.data();
 
-  evaluate_seeking(state, inputs, signals);
+  evaluate_seeking(state, inputs, modes, signals);
   if (strategy.robust) {
     for (int p = 0; p < n; ++p)
       signals.radial[at(p)] = modes[at(p)] != 0 && e[p] * s[p] >= 0.0 ? s[p] / gains_.W_max[at(p)] : 0.0;
@@ -178,8 +178,8 @@ void ClosedLoop::evaluate(Real t, const Real* state, const Real* inputs, const M
   }
   const auto [x, reference] = plants(state, inputs, signals);
   if (strategy.perturbed) {
-    dynamics->values(x, reference, g);
-    disturbance->values(t, d);
+    dynamics->values(x, reference, g, held(1, modes));
+    disturbance->values(t, d, held(2, modes));
     for (int p = 0; p < n; ++p) d[p] += d_ext[p];
   } else {
     std::fill_n(g, n, 0.0);
@@ -222,19 +222,23 @@ void ClosedLoop::weight_norms(const Real* state, Real* norm2) const {
   kernels().column_products(shape().own_entries(), shape().neurons, W, W, norm2);
 }
 
+bool ClosedLoop::is_any_on_sphere(const Modes& modes) const {
+  return std::any_of(modes.begin(), modes.begin() + shape().own_entries(), [](Real mode) { return mode != 0.0; });
+}
+
 void ClosedLoop::event_functions(const Real* state, const Real* inputs, const Modes& modes, Real tolerance,
                                  Signals& signals, Real* values) const {
   constexpr Real almost_zero = 1e-100;  // integrators stop watching a function that begins at zero
   if (!parameters_.strategy.robust) {
-    std::fill_n(values, modes.size(), -1.0);
+    std::fill_n(values, shape().own_entries(), -1.0);
     return;
   }
   weight_norms(state, values);
-  if (std::any_of(modes.begin(), modes.end(), [](auto mode) { return mode != 0; })) {
-    evaluate_errors(state, inputs, signals);
+  if (is_any_on_sphere(modes)) {
+    evaluate_errors(state, inputs, modes, signals);
     evaluate_network(state, signals);
   }
-  for (std::size_t p = 0; p < modes.size(); ++p) {
+  for (std::size_t p = 0; p < at(shape().actions()); ++p) {
     const Real W_max = gains_.W_max[p];
     const Real height = values[p] / W_max - 1.0;
     const Real rate = 2.0 * gains_.beta[p] * signals.error[p] * signals.network[p] / W_max;  // of w'w / W_max, inside
@@ -245,10 +249,10 @@ void ClosedLoop::event_functions(const Real* state, const Real* inputs, const Mo
 
 int ClosedLoop::resolve_modes(const Real* state, const Real* inputs, Real tolerance, Signals& signals,
                               Modes& modes) const {
-  AlignedVector values(modes.size());
+  AlignedVector values(at(shape().own_entries()));
   event_functions(state, inputs, modes, tolerance, signals, values.data());
   int changed = 0;
-  for (std::size_t p = 0; p < modes.size(); ++p) {
+  for (std::size_t p = 0; p < values.size(); ++p) {
     if (!(values[p] > 0.0)) continue;
     modes[p] = modes[p] == 0 ? 1 : 0;
     ++changed;
@@ -257,8 +261,8 @@ int ClosedLoop::resolve_modes(const Real* state, const Real* inputs, Real tolera
 }
 
 void ClosedLoop::project(const Modes& modes, const Real* inputs, Signals& signals, Real* state) const {
-  if (std::any_of(modes.begin(), modes.end(), [](auto mode) { return mode != 0; })) {
-    evaluate_errors(state, inputs, signals);
+  if (is_any_on_sphere(modes)) {
+    evaluate_errors(state, inputs, modes, signals);
     evaluate_network(state, signals);
   }
   for (int p = 0; p < shape().own_entries(); ++p) {

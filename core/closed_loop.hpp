@@ -62,7 +62,7 @@ class ClosedLoop {
   Plants plants(const Real* state, const Real* inputs, Signals& signals) const;
 
   /// The first of the signals: xbar, gradient and error.
-  void evaluate_errors(const Real* state, const Real* inputs, Signals& signals) const;
+  void evaluate_errors(const Real* state, const Real* inputs, const Modes& modes, Signals& signals) const;
 
   /// Activations and network.
   void evaluate_network(const Real* state, Signals& signals) const;
@@ -79,7 +79,7 @@ class ClosedLoop {
 
   /// The part of the signals that every player computes from its own state and estimates: xbar, gradient, error,
   /// activations, network and robust term.
-  void evaluate_seeking(const Real* state, const Real* inputs, Signals& signals) const;
+  void evaluate_seeking(const Real* state, const Real* inputs, const Modes& modes, Signals& signals) const;
 
   /// All signals and state rates at time_origin() + t [s]; the inputs lie as inputs() says.
   void evaluate(Real t, const Real* state, const Real* inputs, const Modes& modes, Signals& signals, Real* rate) const;
@@ -112,6 +112,12 @@ class ClosedLoop {
     bool second;  ///< order 2
   };
   void add_consensus_with_others(const Real* state, const Real* inputs, Real* rate) const;
+
+  [[nodiscard]] bool is_any_on_sphere(const Modes& modes) const;
+  /// What the switches of a family hold.
+  [[nodiscard]] const Real* held(int family, const Modes& modes) const {
+    return modes.data() + parameters_.first_switch(family);
+  }
 
   Parameters parameters_;
   StateLayout layout_;

@@ -508,6 +508,8 @@ Game parse_game(std::string_view toml) {
   PlayerExpressions dynamics_values = none;
   PlayerExpressions disturbance_values = none;
   Gains gains = read_gains(game["gains"], shape.players);
+  std::vector<Switching::OfPlayer> dynamics_graphs;
+  std::vector<Switching::OfPlayer> disturbance_graphs;
   InitialState initial{.x = std::vector<Real>(at(n)),
                        .reference = std::vector<Real>(at(n)),
                        .y = std::vector<Real>(at(shape.hosts()) * at(n))};
@@ -524,14 +526,21 @@ Game parse_game(std::string_view toml) {
     }
     read_coefficients(player["dynamics"], i, shape, dynamics.coefficients);
     read_coefficients(player["disturbance"], i, shape, disturbance.coefficients);
-    expressions.add_coordinates(player["dynamics"]["expression"], Purpose::dynamics, i, dynamics_values);
-    expressions.add_coordinates(player["disturbance"]["expression"], Purpose::disturbance, i, disturbance_values);
+    expressions.add_coordinates(player["dynamics"]["expression"], Purpose::dynamics, i, dynamics_values,
+                                dynamics_graphs);
+    expressions.add_coordinates(player["disturbance"]["expression"], Purpose::disturbance, i, disturbance_values,
+                                disturbance_graphs);
   }
   for (int h = 0; h < shape.hosts(); ++h) {
     const PlayerTable& player = players[at(shape.host(h))];
     read_estimates(player["y0"], h, shape, initial);
     read_weights(player["W0"], shape.host(h), shape, initial);
   }
+  const auto switching = [&](const std::vector<Switching::OfPlayer>& graphs, const char* of) {
+    return Switching(graphs, of, shape.hosts(), n, static_cast<int>(named.values.size()));
+  };
+  Switching dynamics_switching = switching(dynamics_graphs, "dynamics");
+  Switching disturbance_switching = switching(disturbance_graphs, "disturbance");
   dynamics_values.compile();
   disturbance_values.compile();
   cost.coefficients.named = dynamics.coefficients.named = disturbance.coefficients.named = named.values;
@@ -540,22 +549,24 @@ Game parse_game(std::string_view toml) {
   Game read{.title = title,
             .expose = Expose::all,
             .player_names = names,
-            .parameters = {.shape = shape,
-                           .gains = std::move(gains),
-                           .strategy = read_strategy(game["strategy"]),
-                           .rbf = read_networks(rbf, players, shape),
-                           .graph = read_graph(game["graph"], shape),
-                           .cost = family_of<Cost, ExpressionCost>(std::move(cost), has_any(costs), shape, costs),
-                           .dynamics = family_of<UnknownDynamics, ExpressionDynamics>(
-                               std::move(dynamics), !dynamics_values.empty(), dynamics_values),
-                           .disturbance = family_of<Disturbance, ExpressionDisturbance>(
-                               std::move(disturbance), !disturbance_values.empty(), disturbance_values),
-                           .initial = std::move(initial),
-                           .named = std::move(named)}};
+            .parameters = {
+                .shape = shape,
+                .gains = std::move(gains),
+                .strategy = read_strategy(game["strategy"]),
+                .rbf = read_networks(rbf, players, shape),
+                .graph = read_graph(game["graph"], shape),
+                .cost = family_of<Cost, ExpressionCost>(std::move(cost), has_any(costs), shape, costs),
+                .dynamics = family_of<UnknownDynamics, ExpressionDynamics>(
+                    std::move(dynamics), !dynamics_values.empty(), dynamics_values, dynamics_switching),
+                .disturbance = family_of<Disturbance, ExpressionDisturbance>(
+                    std::move(disturbance), !disturbance_values.empty(), disturbance_values, disturbance_switching),
+                .initial = std::move(initial),
+                .named = std::move(named)}};
   read.parameters.guess = read_guess(game["equilibrium"], shape, read.parameters.initial);
   read.expose = read_expose(game["expose"], read.parameters);
   read.parameters.refresh();
   require_bounded_weights(read.parameters);
+  read.parameters.judge_switching();
   if (shape.hosts_all()) {
     nash_equilibrium(*read.parameters.cost, shape, read.parameters.guess);  // throws when it is not unique
   }

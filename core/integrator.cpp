@@ -13,6 +13,7 @@
 #include "errors.hpp"
 #include "failure.hpp"
 #include "kernels/kernels.hpp"
+#include "located_conditions.hpp"
 #include "robust_layer.hpp"
 #include "sundials_handles.hpp"
 #include "sundials_newton_iteration.hpp"
@@ -46,6 +47,7 @@ class Integrator::Implementation final : NewtonSystem {
 
  private:
   void begin_at_restart_point();
+  void plan_event(Real t);
   void take_step();
   bool handle_event();
   void present(Real t);
@@ -81,6 +83,7 @@ class Integrator::Implementation final : NewtonSystem {
   std::unique_ptr<NewtonSolver> newton_;
   LoopJacobian jacobian_;
   RobustLayer layer_;
+  LocatedConditions conditions_;
   int size_;
   std::int64_t most_steps_between_restarts_;
   Tolerances tolerances_;
@@ -96,7 +99,8 @@ class Integrator::Implementation final : NewtonSystem {
   Real internal_time_ = 0.0;  ///< up to here it has looked for events
   bool event_pending_ = false;
   Real event_time_ = 0.0;
-  std::vector<int> event_columns_;  // 1 where a column's event function rose through zero
+  std::vector<int> passed_;   // 1 where an event function rose through zero
+  bool has_planned_ = false;  // an event at a time that is known beforehand, at which CVODE stops
 
   // communication point
   Real time_ = 0.0;
@@ -130,18 +134,19 @@ Integrator::Implementation::Implementation(const ClosedLoop& loop, const Inputs&
       newton_(std::move(newton)),
       jacobian_(loop),
       layer_(loop),
+      conditions_(loop),
       size_(loop.layout().size()),
       most_steps_between_restarts_(most_steps_between_restarts(size_)),
       restart_state_(at(size_)),
-      restart_modes_(at(loop.shape().own_entries())),
-      event_columns_(at(loop.shape().own_entries())),
+      restart_modes_(at(LocatedConditions::count(loop.parameters()))),
+      passed_(at(LocatedConditions::located(loop.parameters()))),
       state_(at(size_)),
-      modes_(at(loop.shape().own_entries())),
+      modes_(restart_modes_.size()),
       signals_(loop.shape()),
       input_values_(at(loop.inputs().size())),
       norm2_(at(loop.shape().own_entries())),
       rate_(at(size_)),
-      event_values_(at(loop.shape().own_entries())),
+      event_values_(passed_.size()),
       context_(make_context()),
       vector_(make_vector(size_, context_.get())),
       matrix_(make_placeholder_matrix(context_.get())),
@@ -197,13 +202,13 @@ Integrator::Implementation::Implementation(const ClosedLoop& loop, const Inputs&
                            }),
           "CVodeSetLinSysFn");
   require(CVodeSetNonlinearSolver(memory, iteration_.handle()), "CVodeSetNonlinearSolver");
-  const int columns = loop.shape().own_entries();
-  require(CVodeRootInit(memory, columns,
+  const auto conditions = static_cast<int>(passed_.size());
+  require(CVodeRootInit(memory, conditions,
                         [](SunReal t, N_Vector y, SunReal* values, void* self) {
                           return static_cast<Self>(self)->event_functions(t, N_VGetArrayPointer(y), values);
                         }),
           "CVodeRootInit");
-  std::vector<int> rising(at(columns), 1);
+  std::vector<int> rising(passed_.size(), 1);
   require(CVodeSetRootDirection(memory, rising.data()), "CVodeSetRootDirection");
   require_whole(vector_.get());
   CVodeSetNoInactiveRootWarn(memory);
@@ -239,7 +244,7 @@ int Integrator::Implementation::finite_rate(Real t, const Real* state, Real* rat
 
 int Integrator::Implementation::event_functions(Real t, const Real* state, Real* values) noexcept {
   return guarded([&] {
-    loop_.event_functions(state, inputs_at(t), modes_, tolerances_.relative, signals_, values);
+    conditions_.event_functions(t, state, inputs_at(t), modes_, tolerances_.relative, signals_, values);
     std::copy_n(values, event_values_.size(), event_values_.begin());
     return 0;
   });
@@ -257,11 +262,11 @@ int Integrator::Implementation::newton_matrix(const Real* state, Real gamma) noe
 // Apart from the robust term, all is nearly linear within a step.
 bool Integrator::Implementation::linearization_holds(const Real* state, Real gamma, const Real* weight,
                                                      Real tolerance) noexcept {
-  return layer_.linearization_holds(jacobian_, signals_, state, input_values_.data(), gamma, weight, tolerance);
+  return layer_.linearization_holds(jacobian_, signals_, modes_, state, input_values_.data(), gamma, weight, tolerance);
 }
 
 bool Integrator::Implementation::stop_correction(Real* state) noexcept {
-  return layer_.stop_in_the_middle(signals_, input_values_.data(), state);
+  return layer_.stop_in_the_middle(signals_, modes_, input_values_.data(), state);
 }
 
 int Integrator::Implementation::solve(Real* b) noexcept {
@@ -324,6 +329,16 @@ void Integrator::Implementation::begin_at_restart_point() {
   iteration_.reset();
   const int flag = CVodeReInit(cvode_.get(), restart_time_, vector_.get());
   if (flag < 0) fail(flag, restart_time_);
+  plan_event(restart_time_);
+}
+
+/// Has CVODE stop where the next event after time t is known to be.
+void Integrator::Implementation::plan_event(Real t) {
+  const Real next = conditions_.next_event(t, modes_) - loop_.time_origin();
+  const bool had_planned = std::exchange(has_planned_, std::isfinite(next));
+  if (!has_planned_ && !had_planned) return;
+  constexpr Real never = 1e300;
+  CVodeSetStopTime(cvode_.get(), has_planned_ ? next : never);
 }
 
 /// The state as it is seen from outside: projected, and never further out than the bound allows.
@@ -342,7 +357,7 @@ void Integrator::Implementation::start(Real t, Tolerances tolerances) {
   largest_raw_excess_ = 0.0;
   time_ = t;
   loop_.initial_state(state_.data());
-  std::fill(modes_.begin(), modes_.end(), std::uint8_t{0});
+  conditions_.begin(t, state_.data(), inputs_at(t), modes_);
   steps_since_restart_ = 0;
   internal_time_ = t;
   restart_time_ = t;
@@ -363,7 +378,7 @@ void Integrator::Implementation::restart(bool parameters_changed) {
     newton_->refresh(jacobian_);
   }
   require_usable_rates(time_, state_.data());
-  loop_.resolve_modes(state_.data(), inputs_at(time_), tolerances_.relative, signals_, modes_);
+  conditions_.pass(time_, state_.data(), inputs_at(time_), tolerances_.relative, nullptr, signals_, modes_);
   restart_time_ = time_;
   restart_state_ = state_;
   restart_modes_ = modes_;
@@ -382,23 +397,27 @@ void Integrator::Implementation::take_step() {
          "the steps that the relative tolerance " + number_text(tolerances_.relative) +
              " asks for fell below the resolution of time");
   }
-  std::fill(event_columns_.begin(), event_columns_.end(), 0);
+  std::fill(passed_.begin(), passed_.end(), 0);
   if (flag == CV_ROOT_RETURN) {
     event_pending_ = true;
     event_time_ = internal_time_;
-    CVodeGetRootInfo(cvode_.get(), event_columns_.data());
+    CVodeGetRootInfo(cvode_.get(), passed_.data());
     return;
   }
-  // A column may end its mode without a change of sign that CVODE can see, when it begins a step past the threshold by
-  // rounding: its mode then changes here.
+  if (flag == CV_TSTOP_RETURN) {
+    event_pending_ = true;
+    event_time_ = internal_time_;
+  }
+  // A mode may end without a change of sign that CVODE can see, when it begins a step past the threshold by rounding:
+  // it then changes here.
   for (std::size_t p = 0; p < event_values_.size(); ++p) {
     if (event_values_[p] > 0.0) {
-      event_columns_[p] = 1;
+      passed_[p] = 1;
       event_pending_ = true;
       event_time_ = internal_time_;
     }
   }
-  // an event without columns: a restart that bounds what a restore has to repeat
+  // an event without conditions: a restart that bounds what a restore has to repeat
   if (!event_pending_ && steps_since_restart_ >= most_steps_between_restarts_) {
     event_pending_ = true;
     event_time_ = internal_time_;
@@ -406,22 +425,21 @@ void Integrator::Implementation::take_step() {
 }
 
 /// Handles the pending event; true when that was a restart. A column that enters the sphere needs one, because its
-/// rates jump. One that leaves does not: its rates are those that CVODE has been using since.
+/// rates jump. One that leaves does not: its rates are those that CVODE has been using since. Switches of expressions
+/// need one where values jump.
 bool Integrator::Implementation::handle_event() {
   event_pending_ = false;
   const Real t = event_time_;
   Real* state = N_VGetArrayPointer(vector_.get());
   interpolate(t, state);
   settle(t, state);
-  loop_.evaluate_seeking(state, inputs_at(t), signals_);
-  bool restarts = steps_since_restart_ >= most_steps_between_restarts_;
-  for (std::size_t p = 0; p < modes_.size(); ++p) {
-    if (event_columns_[p] == 0) continue;
-    modes_[p] = modes_[p] == 0 ? 1 : 0;
-    ++events_;
-    restarts = restarts || (modes_[p] != 0 && signals_.error[p] * signals_.network[p] >= 0.0);
+  const auto [events, restarts] =
+      conditions_.pass(t, state, inputs_at(t), tolerances_.relative, passed_.data(), signals_, modes_);
+  events_ += events;
+  if (!restarts && steps_since_restart_ < most_steps_between_restarts_) {
+    if (has_planned_) plan_event(t);
+    return false;
   }
-  if (!restarts) return false;
   restart_statistics_ = statistics();
   loop_.project(modes_, inputs_at(t), signals_, state);
   std::copy_n(state, size_, restart_state_.begin());
@@ -464,8 +482,10 @@ void Integrator::Implementation::advance(Real t_end) {
       if (++steps < patience) continue;
       if (!(internal_time_ - mark >= least_progress)) {
         stop(internal_time_, N_VGetArrayPointer(vector_.get()),
-             std::to_string(patience) + " steps with " + std::to_string(events_ - events) + " events advanced it by " +
-                 number_text(internal_time_ - mark) + " s, which is no progress towards " + absolute(t_end));
+             std::to_string(patience) + " steps with " + std::to_string(events_ - events) + " events" +
+                 (conditions_.last_switch().empty() ? "" : ", the last of " + conditions_.last_switch() + ",") +
+                 " advanced it by " + number_text(internal_time_ - mark) + " s, which is no progress towards " +
+                 absolute(t_end));
       }
       events = events_;
       mark = internal_time_;

@@ -1,5 +1,6 @@
-// Integrates the closed loop by CVODE (BDF, Newton), with the projection's events located by their signs.
-// Entering the sphere makes the rates jump and restarts CVODE; leaving it does not.
+// Integrates the closed loop by CVODE (BDF, Newton), with the events of the projection and of expressions located by
+// their signs, or hit where their times are known beforehand. Entering the sphere, and most switches of expressions,
+// make the rates jump and restart CVODE; leaving it and bends do not.
 //
 // CVODE takes its internal steps one by one and outputs are interpolated, so the sequence of internal steps depends on
 // nothing but the last restart point (time, state, modes, parameters, inputs): communication points leave no trace, and
@@ -29,7 +30,7 @@ struct Statistics {
   std::int64_t rate_evaluations = 0;
   std::int64_t newton_setups = 0;
   std::int64_t newton_solves = 0;
-  std::int64_t events = 0;  ///< columns that entered or left the sphere
+  std::int64_t events = 0;  ///< columns that entered or left the sphere, and switches of expressions
   friend bool operator==(const Statistics&, const Statistics&) = default;
 };
 

@@ -84,6 +84,18 @@ struct Parameters {
     return zero;
   }
 
+  /// Where the values that the switches of family number f hold begin among the modes.
+  [[nodiscard]] int first_switch(int f) const {
+    int first = shape.own_entries();
+    for (int k = 0; k < f; ++k) first += families()[at(k)]->switching().count();
+    return first;
+  }
+
+  /// Throws GameError when named parameters have values with which a switch of an expression makes no sense.
+  void judge_switching() const {
+    for (const GameFamily* family : families()) family->switching().judge(named.values.data());
+  }
+
   /// Rebuilds what is derived from coefficients; called after any of them changed.
   void refresh() {
     graph.refresh();

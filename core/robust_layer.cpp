@@ -40,13 +40,14 @@ void RobustLayer::find_weights(const LoopJacobian& jacobian, Real gamma, const R
   }
 }
 
-bool RobustLayer::linearization_holds(const LoopJacobian& jacobian, const Signals& signals, const Real* state,
-                                      const Real* inputs, Real gamma, const Real* weight, Real tolerance) {
+bool RobustLayer::linearization_holds(const LoopJacobian& jacobian, const Signals& signals, const Modes& modes,
+                                      const Real* state, const Real* inputs, Real gamma, const Real* weight,
+                                      Real tolerance) {
   if (!loop_.parameters().strategy.robust) return true;
   const GainRows& gains = loop_.gains();
   if (std::all_of(gains.delta.begin(), gains.delta.end(), [](Real delta) { return delta == 0.0; })) return true;
   const std::size_t columns = place_.size();
-  loop_.evaluate_errors(state, inputs, trial_);
+  loop_.evaluate_errors(state, inputs, modes, trial_);
   find_weights(jacobian, gamma, weight);
   const auto change = [&](std::size_t p) { return trial_.error[p] - signals.error[p]; };
   const auto counted = [&](std::size_t p, Real defect) {
@@ -76,9 +77,9 @@ bool RobustLayer::linearization_holds(const LoopJacobian& jacobian, const Signal
   return largest <= tolerance;
 }
 
-bool RobustLayer::stop_in_the_middle(const Signals& signals, const Real* inputs, Real* state) {
+bool RobustLayer::stop_in_the_middle(const Signals& signals, const Modes& modes, const Real* inputs, Real* state) {
   if (!loop_.parameters().strategy.robust) return false;
-  loop_.evaluate_errors(state, inputs, trial_);
+  loop_.evaluate_errors(state, inputs, modes, trial_);
   loop_.evaluate_robust_term(trial_);
   bool stopped = false;
   for (std::size_t p = 0; p < place_.size(); ++p) {

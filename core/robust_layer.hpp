@@ -17,14 +17,15 @@ class RobustLayer {
   /// follows them, weighted like the velocity, action or weights that they move, up to the tolerance in each column.
   /// Signals belong to the state that the last correction set out from, slopes to the factorized Jacobian. A solution
   /// follows a defect by 1 / (1 + gamma slope) of it, with the lesser of the slopes foretold and found.
-  [[nodiscard]] bool linearization_holds(const LoopJacobian& jacobian, const Signals& signals, const Real* state,
-                                         const Real* inputs, Real gamma, const Real* weight, Real tolerance);
+  [[nodiscard]] bool linearization_holds(const LoopJacobian& jacobian, const Signals& signals, const Modes& modes,
+                                         const Real* state, const Real* inputs, Real gamma, const Real* weight,
+                                         Real tolerance);
 
   /// Stops columns that a correction, which set out from the signals' state, carried across the layer: puts them in its
   /// middle e = 0 by their velocity or (order 1) action. False when there was none. On either side of the middle
   /// e + a phi(e) is concave or convex, so that Newton's iteration with a Jacobian of its own at each iterate converges
   /// from there without another crossing.
-  bool stop_in_the_middle(const Signals& signals, const Real* inputs, Real* state);
+  bool stop_in_the_middle(const Signals& signals, const Modes& modes, const Real* inputs, Real* state);
 
  private:
   void find_weights(const LoopJacobian& jacobian, Real gamma, const Real* weight);

@@ -1,17 +1,18 @@
 // The variables inside the closed loop at one instant, and the projection modes that they depend on.
 #pragma once
 
-#include <cstdint>
+#include <vector>
 
 #include "aligned_vector.hpp"
 #include "types.hpp"
 
 namespace mixed_order_game {
 
-/// Mode of each weight column: 0 inside (w'w < W_max), 1 on the sphere (w'w = W_max and e w'S >= 0). The mode alone
-/// does not decide the dynamics of a column on the sphere: where e w'S < 0 it moves as one inside, so that leaving the
-/// sphere changes nothing in the rates.
-using Modes = std::vector<std::uint8_t>;
+/// What is held between events. First the mode of each weight column: 0 inside (w'w < W_max), 1 on the sphere (w'w =
+/// W_max and e w'S >= 0). The mode alone does not decide the dynamics of a column on the sphere: where e w'S < 0 it
+/// moves as one inside, so that leaving the sphere changes nothing in the rates. Then the values that the switches of
+/// the costs' expressions hold, of the dynamics' and of the disturbances'.
+using Modes = std::vector<Real>;
 
 /// Filled by ClosedLoop::evaluate. Vectors are indexed by own entries unless said otherwise.
 struct Signals {

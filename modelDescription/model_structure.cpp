@@ -106,10 +106,10 @@ class Analysis {
     const LoopNumbers<Dependencies> numbers = loop_numbers(coefficients);
     std::vector<Dependencies> inputs;
     for (int k = 0; k < loop_.inputs.size(); ++k) inputs.push_back(knowns_.input(k));
-    loop_.evaluate_control(numbers, state_.data(), inputs.data());
+    const Modes on_sphere(at(shape_.own_entries()), 1.0);
+    loop_.evaluate_control(numbers, state_.data(), inputs.data(), on_sphere);
     if (!model.variables.states().empty()) {
       rate_.resize(state_.size());
-      const Modes on_sphere(at(shape_.own_entries()), 1);
       loop_.evaluate_rates(numbers, knowns_.time(), state_.data(), inputs.data(), on_sphere, rate_.data());
     }
     if (equations == Equations::initial && shape_.hosts_all()) find_equilibrium(coefficients[0]);

@@ -95,26 +95,30 @@ void ExpressionReader::unroll_into(const TomlEntry& entry, const Place& place, E
 
 ExpressionCost::Text ExpressionReader::cost(const TomlEntry& entry, int i) const {
   if (!entry.present()) return {};
-  ExpressionCost::Text text{std::make_shared<ExpressionGraph>(most_nodes), 0};
+  ExpressionCost::Text text{std::make_shared<ExpressionGraph>(most_nodes, cost_switches_), 0};
   const Place place{
       .shape = &shape_, .parameters = &parameters_, .purpose = Purpose::cost, .player = i, .coordinate = -1};
   unroll_into(entry, place, *text.graph, text.node);
+  cost_switches_ += static_cast<int>(text.graph->switches().size());
   return text;
 }
 
-void ExpressionReader::add_coordinates(const TomlEntry& entry, Purpose purpose, int i,
-                                       PlayerExpressions& values) const {
+void ExpressionReader::add_coordinates(const TomlEntry& entry, Purpose purpose, int i, PlayerExpressions& values,
+                                       std::vector<Switching::OfPlayer>& graphs) const {
   if (!entry.present()) return;
   const std::string expected = "a text, or a list of " + std::to_string(shape_.dimension) + " texts";
   const bool is_list = entry.is_list();
   if (is_list && entry.length(expected) != at(shape_.dimension)) entry.fail(expected);
-  const auto graph = std::make_shared<ExpressionGraph>(most_nodes);
+  int switches = 0;
+  for (const Switching::OfPlayer& other : graphs) switches += static_cast<int>(other.graph->switches().size());
+  const auto graph = std::make_shared<ExpressionGraph>(most_nodes, switches);
   for (int l = 0; l < shape_.dimension; ++l) {
     const Place place{.shape = &shape_, .parameters = &parameters_, .purpose = purpose, .player = i, .coordinate = l};
     int node = 0;
     unroll_into(is_list ? entry.item(at(l)) : entry, place, *graph, node);
     values.add(shape_.own_entry(shape_.host_number(i), l), shape_.host_number(i), graph, node);
   }
+  graphs.push_back({shape_.host_number(i), i, graph});
 }
 
 }  // namespace mixed_order_game

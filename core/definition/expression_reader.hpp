@@ -23,8 +23,10 @@ class ExpressionReader {
 
   /// The cost of player i, when its table has an expression.
   [[nodiscard]] ExpressionCost::Text cost(const TomlEntry& entry, int i) const;
-  /// One value for each coordinate of player i: one text in which l is the coordinate, or a list of texts.
-  void add_coordinates(const TomlEntry& entry, Purpose purpose, int i, PlayerExpressions& values) const;
+  /// One value for each coordinate of player i: one text in which l is the coordinate, or a list of texts. Graphs
+  /// have the switches.
+  void add_coordinates(const TomlEntry& entry, Purpose purpose, int i, PlayerExpressions& values,
+                       std::vector<Switching::OfPlayer>& graphs) const;
 
  private:
   struct Unrolled {
@@ -36,6 +38,7 @@ class ExpressionReader {
   std::string_view document_;
   const Shape& shape_;
   const NamedParameters& parameters_;
+  mutable int cost_switches_ = 0;  // of the players before
 };
 
 }  // namespace mixed_order_game

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "errors.hpp"
+#include "expression/noise.hpp"
 
 namespace mixed_order_game {
 
@@ -63,6 +64,32 @@ Real apply(Operation operation, Real a, Real b) {
       return std::erf(a);
     case Operation::hypot:
       return std::hypot(a, b);
+    case Operation::abs:
+      return std::fabs(a);
+    case Operation::min:
+      return b < a ? b : a;
+    case Operation::max:
+      return b > a ? b : a;
+    case Operation::floor:
+      return std::floor(a);
+    case Operation::sign_of:
+      return a >= 0.0 ? 1.0 : -1.0;
+    case Operation::positive:
+      return a > 0.0 ? 1.0 : 0.0;
+    case Operation::not_negative:
+      return a >= 0.0 ? 1.0 : 0.0;
+    case Operation::sign:
+      return a > 0.0 ? 1.0 : a < 0.0 ? -1.0 : 0.0;
+    case Operation::choose:
+      return a != 0.0 ? b : 0.0;
+    case Operation::multiply_unless_zero:
+      return a != 0.0 ? a * b : 0.0;
+    case Operation::usable:
+      return std::isfinite(a) ? 1.0 : 0.0;
+    case Operation::alternating:
+      return a == 2.0 * std::floor(0.5 * a) ? 1.0 : -1.0;
+    case Operation::noise:
+      return noise(a, b);
   }
   return a;
 }
@@ -85,8 +112,46 @@ int ExpressionGraph::find_or_add(const GraphNode& node) {
       throw GameError("the expressions unroll to more than " + std::to_string(most_nodes_) + " operations");
     }
     nodes_.push_back(node);
+    traits_.push_back(traits_of(node));
   }
   return found->second;
+}
+
+std::uint8_t ExpressionGraph::traits_of(const GraphNode& node) const {
+  std::uint8_t traits = 0;
+  switch (node.operation) {
+    case Operation::number:
+      return 0;
+    case Operation::leaf:
+      switch (leaves_[at(node.a)].kind) {
+        case LeafKind::parameter:
+          return 0;
+        case LeafKind::held:
+          return holding;
+        default:
+          return varying;
+      }
+    case Operation::divide:
+    case Operation::power:
+    case Operation::power_log:
+    case Operation::sqrt:
+    case Operation::exp:
+    case Operation::expm1:
+    case Operation::log:
+    case Operation::log1p:
+    case Operation::tan:
+    case Operation::asin:
+    case Operation::acos:
+    case Operation::sinh:
+    case Operation::cosh:
+      traits = undefined;
+      break;
+    default:
+      break;
+  }
+  traits |= traits_[at(node.a)];
+  if (node.b >= 0) traits |= traits_[at(node.b)];
+  return traits;
 }
 
 int ExpressionGraph::number(Real value) { return find_or_add({.operation = Operation::number, .value = value}); }
@@ -124,6 +189,15 @@ int ExpressionGraph::make(Operation operation, int a, int b) {
       if (this->is_number(b, 1.0)) return a;
       if (this->is_number(a, -1.0)) return make(Operation::negative, b);
       if (this->is_number(b, -1.0)) return make(Operation::negative, a);
+      break;
+    case Operation::multiply_unless_zero:
+      if (this->is_number(a, 0.0) || this->is_number(b, 0.0)) return number(0.0);
+      if (this->is_number(a)) return make(Operation::multiply, a, b);
+      if (this->is_number(b, 1.0)) return a;
+      break;
+    case Operation::choose:
+      if (this->is_number(b, 0.0)) return b;
+      if (this->is_number(a)) return this->is_number(a, 0.0) ? number(0.0) : b;
       break;
     case Operation::divide:
       if (this->is_number(a, 0.0)) return a;
@@ -209,52 +283,83 @@ std::pair<int, int> ExpressionGraph::partials(int k) {
       return {times(number(2.0 * std::numbers::inv_sqrtpi), make(Operation::exp, negative(times(a, a)))), -1};
     case Operation::hypot:
       return {over(a, k), over(b, k)};
+    case Operation::abs:
+      return {make(Operation::sign_of, a), -1};
+    case Operation::max: {  // factors that choose
+      const int first = make(Operation::not_negative, minus(a, b));
+      return {first, minus(one, first)};
+    }
+    case Operation::min: {
+      const int first = make(Operation::not_negative, minus(b, a));
+      return {first, minus(one, first)};
+    }
+    case Operation::choose:
+      return {-1, a};
+    case Operation::multiply_unless_zero:
+      return {b, a};
+    case Operation::floor:
+    case Operation::sign_of:
+    case Operation::positive:
+    case Operation::not_negative:
+    case Operation::sign:
+    case Operation::usable:
+    case Operation::alternating:
+    case Operation::noise:
+      return {-1, -1};
   }
   return {-1, -1};
 }
 
-bool ExpressionGraph::has_only_parameters(int of) const {
-  std::vector<int> path{of};
-  std::vector<bool> seen(nodes_.size());
-  while (!path.empty()) {
-    const int k = path.back();
-    path.pop_back();
-    if (seen[at(k)]) continue;
-    seen[at(k)] = true;
-    const GraphNode& one = node(k);
-    if (one.operation == Operation::number) continue;
-    if (one.operation == Operation::leaf) {
-      if (leaf_of(k).kind != LeafKind::parameter) return false;
+int ExpressionGraph::held(Switch wanted) {
+  for (std::size_t k = 0; k < switches_.size(); ++k) {
+    Switch& known = switches_[k];
+    if (known.kind != wanted.kind || known.value != wanted.value || known.step != wanted.step ||
+        known.is_bend != wanted.is_bend) {
       continue;
     }
-    path.push_back(one.a);
-    if (one.b >= 0) path.push_back(one.b);
+    if (known.guard >= 0 && known.guard != wanted.guard) {  // either
+      known.guard = wanted.guard < 0 ? -1 : make(Operation::max, known.guard, wanted.guard);
+    }
+    return leaf({LeafKind::held, first_switch_ + static_cast<int>(k)});
   }
-  return true;
+  switches_.push_back(std::move(wanted));
+  return leaf({LeafKind::held, first_switch_ + static_cast<int>(switches_.size()) - 1});
 }
 
 std::vector<std::pair<Leaf, int>> ExpressionGraph::derivatives(int node_of) {
   // adjoints from the node down to the leaves; operands have lower numbers than what is made of them
-  std::map<int, int, std::greater<>> adjoint{{node_of, number(1.0)}};
+  struct Adjoint {
+    int weight;
+    bool may_be_masked;  // 0 in a branch that is not taken, in which partial derivatives need not be finite
+  };
+  std::map<int, Adjoint, std::greater<>> adjoint{{node_of, {number(1.0), false}}};
   std::vector<std::pair<Leaf, int>> along;
   while (!adjoint.empty()) {
-    const auto [k, weight] = *adjoint.begin();
+    const int k = adjoint.begin()->first;
+    const auto [weight, may_be_masked] = adjoint.begin()->second;
     adjoint.erase(adjoint.begin());
-    if (node(k).operation == Operation::leaf) {
-      if (!is_number(weight, 0.0)) along.emplace_back(leaf_of(k), weight);
+    const Operation operation = node(k).operation;
+    if (operation == Operation::leaf) {
+      if (!is_number(weight, 0.0) && leaf_of(k).kind != LeafKind::held) along.emplace_back(leaf_of(k), weight);
       continue;
     }
     const int operands[] = {node(k).a, node(k).b};
-    if (node(k).operation == Operation::number) continue;
+    if (operation == Operation::number) continue;
     const auto [first, second] = partials(k);
     const int partial[] = {first, second};
+    const bool chooses = operation == Operation::choose || operation == Operation::min || operation == Operation::max;
     for (int which = 0; which < 2; ++which) {
       if (partial[which] < 0 || operands[which] < 0) continue;
       if (node(operands[which]).operation == Operation::number) continue;
-      const int share = make(Operation::multiply, weight, partial[which]);
+      const int share = chooses         ? make(Operation::choose, partial[which], weight)
+                        : may_be_masked ? make(Operation::multiply_unless_zero, weight, partial[which])
+                                        : make(Operation::multiply, weight, partial[which]);
       if (is_number(share, 0.0)) continue;
-      const auto [found, is_new] = adjoint.try_emplace(operands[which], share);
-      if (!is_new) found->second = make(Operation::add, found->second, share);
+      const bool masked = may_be_masked || chooses || (operation == Operation::multiply_unless_zero && which == 1);
+      const auto [found, is_new] = adjoint.try_emplace(operands[which], Adjoint{share, masked});
+      if (is_new) continue;
+      found->second.weight = make(Operation::add, found->second.weight, share);
+      found->second.may_be_masked = found->second.may_be_masked || masked;
     }
   }
   return along;

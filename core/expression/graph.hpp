@@ -5,6 +5,7 @@
 #include <compare>
 #include <cstdint>
 #include <map>
+#include <string>
 #include <unordered_map>
 #include <utility>
 #include <vector>
@@ -15,7 +16,8 @@
 namespace mixed_order_game {
 
 /// What a leaf stands for; the index counts entries of a joint action, or named parameters.
-enum class LeafKind : std::uint8_t { action, velocity, time, parameter };
+/// Held values belong to switches.
+enum class LeafKind : std::uint8_t { action, velocity, time, parameter, held };
 
 struct Leaf {
   LeafKind kind = LeafKind::action;
@@ -30,10 +32,38 @@ struct GraphNode {
   Real value = 0.0;
 };
 
+/// How the value that a switch holds follows from a node s.
+enum class SwitchKind : std::uint8_t {
+  positive,      ///< 1 where s > 0, else 0
+  not_negative,  ///< 1 where s >= 0, else 0
+  sign,          ///< -1, 0 or 1
+  count,         ///< the largest integer k with k step <= s
+};
+
+/// What changes an expression abruptly: its value is held between events, which are located.
+struct Switch {
+  SwitchKind kind = SwitchKind::positive;
+  int value = -1;         ///< the node s
+  int step = -1;          ///< of a count: a node of parameters
+  int guard = -1;         ///< a node: nothing depends on the switch where that is 0; -1: there is none
+  bool is_timed = false;  ///< s is affine in time while other switches hold, so that events are known beforehand
+  bool is_bend = false;   ///< values are continuous there, and nothing has to be held
+  std::string text = {};  ///< that it stands for
+};
+
+/// What a node of parameters must be, judged when they are set.
+struct Requirement {
+  enum class Kind : std::uint8_t { positive, seed };
+  Kind kind = Kind::positive;
+  int node = -1;
+  std::string text = {};  ///< that it stands for, as in "b of mod(a, b)"
+};
+
 class ExpressionGraph {
  public:
-  /// Largest number of nodes; throws GameError beyond.
-  explicit ExpressionGraph(std::size_t most_nodes) : most_nodes_(most_nodes) {}
+  /// Largest number of nodes; throws GameError beyond. Its switches are numbered from the first one on.
+  explicit ExpressionGraph(std::size_t most_nodes, int first_switch = 0)
+      : most_nodes_(most_nodes), first_switch_(first_switch) {}
 
   int number(Real value);
   int leaf(Leaf leaf);
@@ -47,12 +77,26 @@ class ExpressionGraph {
   [[nodiscard]] int size() const { return static_cast<int>(nodes_.size()); }
   [[nodiscard]] bool is_number(int node) const { return nodes_[at(node)].operation == Operation::number; }
   /// Whether none of the leaves that it is made of is anything but a named parameter.
-  [[nodiscard]] bool has_only_parameters(int node) const;
+  [[nodiscard]] bool has_only_parameters(int node) const { return (traits_[at(node)] & (varying | holding)) == 0; }
+  /// Whether any of them is an action, a velocity or time.
+  [[nodiscard]] bool varies(int node) const { return (traits_[at(node)] & varying) != 0; }
+  /// Whether any of them is a held value.
+  [[nodiscard]] bool holds(int node) const { return (traits_[at(node)] & holding) != 0; }
+  /// Whether it may have no finite value at some finite point.
+  [[nodiscard]] bool may_be_undefined(int node) const { return (traits_[at(node)] & undefined) != 0; }
   [[nodiscard]] bool is_number(int node, Real value) const {
     return nodes_[at(node)].operation == Operation::number && nodes_[at(node)].value == value;
   }
 
-  /// The derivative of a node along every leaf that it depends on, in an order that follows from its structure.
+  /// The leaf of a switch's held value. Of two switches that are equal but for their guards one is made.
+  int held(Switch wanted);
+  [[nodiscard]] const std::vector<Switch>& switches() const { return switches_; }
+  [[nodiscard]] int first_switch() const { return first_switch_; }
+
+  std::vector<Requirement> requirements;
+
+  /// The derivative of a node along every leaf but held values that it depends on, in an order that follows from its
+  /// structure.
   std::vector<std::pair<Leaf, int>> derivatives(int node);
 
  private:
@@ -70,11 +114,20 @@ class ExpressionGraph {
   /// Derivatives along a and b of a node, as nodes; -1 where there is no such operand.
   std::pair<int, int> partials(int node);
 
+  // what is in a node or in what it is made of
+  static constexpr std::uint8_t varying = 1;
+  static constexpr std::uint8_t holding = 2;
+  static constexpr std::uint8_t undefined = 4;
+  [[nodiscard]] std::uint8_t traits_of(const GraphNode& node) const;
+
   std::size_t most_nodes_;
   std::vector<GraphNode> nodes_;
+  std::vector<std::uint8_t> traits_;
   std::vector<Leaf> leaves_;
   std::map<Leaf, int> leaf_nodes_;
   std::unordered_map<Key, int, Hash> known_;
+  int first_switch_;
+  std::vector<Switch> switches_;
 };
 
 /// One operation on reals.

@@ -6,9 +6,42 @@
 
 namespace mixed_order_game {
 
+namespace {
+
+/// The leaves that the switches of a node, and the switches of those, depend on.
+std::set<Leaf> leaves_of_switches(const ExpressionGraph& graph, int of) {
+  std::set<Leaf> leaves;
+  std::vector<std::pair<int, bool>> path{{of, false}};  // nodes, and whether a switch depends on them
+  std::set<std::pair<int, bool>> seen;
+  while (!path.empty()) {
+    const auto [k, switches] = path.back();
+    path.pop_back();
+    if (!seen.insert({k, switches}).second) continue;
+    const GraphNode& node = graph.node(k);
+    if (node.operation == Operation::number) continue;
+    if (node.operation != Operation::leaf) {
+      path.emplace_back(node.a, switches);
+      if (node.b >= 0) path.emplace_back(node.b, switches);
+      continue;
+    }
+    const Leaf& leaf = graph.leaf_of(k);
+    if (leaf.kind == LeafKind::held) {
+      const Switch& of_leaf = graph.switches()[at(leaf.index - graph.first_switch())];
+      path.emplace_back(of_leaf.value, true);
+      if (of_leaf.step >= 0) path.emplace_back(of_leaf.step, true);
+    } else if (switches) {
+      leaves.insert(leaf);
+    }
+  }
+  return leaves;
+}
+
+}  // namespace
+
 PlayerExpressions::PlayerExpressions(int slots, int players, int actions, int parameters)
     : slots_(slots), players_(players), actions_(actions), parameters_(parameters), player_of_(at(slots), -1) {
   for (SparseRows& pattern : patterns_) pattern.start.assign(at(slots + 1), 0);
+  switched_by_ = patterns_;
 }
 
 void PlayerExpressions::add(int slot, int player, std::shared_ptr<const ExpressionGraph> graph, int node) {
@@ -74,6 +107,7 @@ void PlayerExpressions::compile() {
     for (auto& [player, wanted] : results) all.push_back(std::move(wanted));
     derivatives_[kind] = Tapes(all);
   }
+  find_switches(member_of);
   std::map<int, PlayerResults> results;
   for (const Member& member : members_) {
     PlayerResults& wanted = results[member.player];
@@ -87,10 +121,24 @@ void PlayerExpressions::compile() {
   values_ = Tapes(all);
   std::array<std::set<int>, kinds> used;
   for (const auto& [original, graph] : extended) {
-    for (const Leaf& leaf : original->leaves()) used[at(static_cast<int>(leaf.kind))].insert(leaf.index);
+    for (const Leaf& leaf : original->leaves()) {
+      if (leaf.kind != LeafKind::held) used[at(static_cast<int>(leaf.kind))].insert(leaf.index);
+    }
   }
   for (std::size_t kind = 0; kind < kinds; ++kind) used_[kind].assign(used[kind].begin(), used[kind].end());
   members_.clear();  // the graphs have served
+}
+
+void PlayerExpressions::find_switches(const std::vector<const Member*>& member_of) {
+  switched_by_ = {};
+  for (const Member* member : member_of) {
+    if (member != nullptr && !member->graph->switches().empty()) {
+      for (const Leaf& leaf : leaves_of_switches(*member->graph, member->node)) {  // ascending
+        switched_by_[static_cast<std::size_t>(leaf.kind)].column.push_back(leaf.index);
+      }
+    }
+    for (SparseRows& rows : switched_by_) rows.start.push_back(rows.entries());
+  }
 }
 
 void PlayerExpressions::values(const LeafValues& leaves, Real* value) const { values_.evaluate(leaves, value); }
@@ -114,7 +162,8 @@ void PlayerExpressions::add_values(const LeafValuesAs<Dual>& leaves, Dual* value
                          .stride = leaves.stride,
                          .velocities = velocities.data(),
                          .time = leaves.time == nullptr ? 0.0 : leaves.time->value,
-                         .parameters = parameters.data()};
+                         .parameters = parameters.data(),
+                         .held = leaves.held};
   std::vector<Real> values(at(slots_), 0.0);
   this->values(plain, values.data());
   for (int slot = 0; slot < slots_; ++slot) value[slot].value += values[at(slot)];
@@ -149,6 +198,11 @@ void PlayerExpressions::add_values(const LeafValuesAs<Dependencies>& leaves, Dep
             value[slot] += leaf.nonlinear();
             break;
         }
+      }
+      const SparseRows& switched_by = switched_by_[kind];
+      for (int k = switched_by.start[at(slot)]; k < switched_by.start[at(slot + 1)]; ++k) {
+        value[slot] +=
+            leaves.value(static_cast<LeafKind>(kind), switched_by.column[at(k)], player_of_[at(slot)]).nonlinear();
       }
     }
   }

@@ -20,6 +20,7 @@ struct LeafValuesAs {
   const Scalar* velocities = nullptr;
   const Scalar* time = nullptr;
   const CoefficientsAs<Scalar>* coefficients = nullptr;  ///< for the named parameters
+  const Real* held = nullptr;  ///< by the switches; their events change nothing to first order
 
   [[nodiscard]] Scalar value(LeafKind kind, int index, int player) const {
     switch (kind) {
@@ -30,6 +31,7 @@ struct LeafValuesAs {
       case LeafKind::time:
         return *time;
       case LeafKind::parameter:
+      case LeafKind::held:
         break;
     }
     return coefficients->named(index);
@@ -79,6 +81,8 @@ class PlayerExpressions {
     int node;
   };
 
+  void find_switches(const std::vector<const Member*>& member_of);
+
   int slots_ = 0;
   int players_ = 0;
   int actions_ = 0;
@@ -90,6 +94,7 @@ class PlayerExpressions {
   std::array<std::vector<int>, kinds> used_;
   std::array<std::vector<Factor>, kinds> factors_;  // along the patterns
   std::array<Tapes, kinds> derivatives_;
+  std::array<SparseRows, kinds> switched_by_;  // the leaves that the switches of a value depend on
 };
 
 }  // namespace mixed_order_game

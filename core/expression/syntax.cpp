@@ -125,12 +125,12 @@ template <typename Rule>
 using Control = must_if<Messages, normal, false>::control<Rule>;
 
 template <typename Rule>
-using Kept =
-    parse_tree::selector<Rule,
-                         parse_tree::store_content::on<number, name, minus, times, plus_minus, compared, word_not,
-                                                       word_and, word_or, reducer, bound, called, first, last, filter>,
-                         parse_tree::remove_content::on<reduction, call, reference, power, exponent, signed_power,
-                                                        product, sum, comparison, negation, conjunction, expression>>;
+using Kept = parse_tree::selector<
+    Rule,
+    parse_tree::store_content::on<number, name, minus, times, plus_minus, compared, word_not, word_and, word_or,
+                                  reducer, bound, called, first, last, filter, call, comparison>,
+    parse_tree::remove_content::on<reduction, reference, power, exponent, signed_power, product, sum, negation,
+                                   conjunction, expression>>;
 
 }  // namespace grammar
 
@@ -139,6 +139,19 @@ using Node = peg::parse_tree::node;
 std::size_t position_of(const Node& node) { return node.begin().byte; }
 
 Syntax tree_of(const Node& node);
+
+/// A piece of the text in one line, without spaces at its end, and shortened.
+std::string text_of(const Node& node) {
+  constexpr std::size_t longest = 80;
+  std::string text;
+  for (const char c : node.string_view()) {
+    const bool is_space = static_cast<unsigned char>(c) <= 0x20;
+    if (!is_space || (!text.empty() && text.back() != ' ')) text += is_space ? ' ' : c;
+  }
+  while (!text.empty() && text.back() == ' ') text.pop_back();
+  if (text.size() > longest) text = text.substr(0, longest - 3) + "...";
+  return text;
+}
 
 /// From operands and operators in turn; sums and products stay flat, however long they are.
 Syntax chain_of(const Node& node, Syntax::Kind kind) {
@@ -189,6 +202,7 @@ Syntax tree_of(const Node& node) {
                 .name = node.children[0]->string(),
                 .position = position_of(*node.children[0])};
     for (std::size_t k = 1; k < node.children.size(); ++k) tree.children.push_back(tree_of(*node.children[k]));
+    if (node.is_type<call>()) tree.text = text_of(node);
     return tree;
   }
   if (node.is_type<reduction>()) {  // reducer, body, bound, first, last and perhaps a filter
@@ -208,7 +222,11 @@ Syntax tree_of(const Node& node) {
     for (const auto& child : node.children) tree.children.push_back(tree_of(*child));
     return tree;
   }
-  if (node.is_type<comparison>()) return chain_of(node, Kind::comparison);
+  if (node.is_type<comparison>()) {
+    Syntax tree = chain_of(node, Kind::comparison);
+    if (tree.kind == Kind::comparison) tree.text = text_of(node);
+    return tree;
+  }
   if (node.is_type<conjunction>() || node.is_type<expression>()) return chain_of(node, Kind::logical);
   return chain_of(node, Kind::arithmetic);  // sums and products, and what stands for its only child
 }

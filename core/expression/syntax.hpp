@@ -43,6 +43,7 @@ struct Syntax {
   Real value = 0.0;
   std::size_t position = 0;
   std::vector<Syntax> children = {};
+  std::string text = {};  ///< of a call or comparison: as it is written
 };
 
 /// Longest text, and deepest nesting of brackets, powers and functions in it.

@@ -108,7 +108,6 @@ Tapes::Tapes(const std::vector<PlayerResults>& results) {
         }
         tape.players.push_back(member.player);
       }
-      for (LeafRow& leaf : tape.leaves) leaf.index.resize(at(tape.lanes), leaf.index[0]);
       tapes.push_back(std::move(tape));
     }
   }
@@ -120,27 +119,35 @@ void Tapes::run(std::size_t number, const LeafValues& leaves, Real* result) cons
   const Tape& tape = (*tapes_)[number];
   Real* rows = rows_[number].data();
   const std::size_t lanes = at(tape.lanes);
+  const std::size_t players = tape.players.size();
   for (const LeafRow& leaf : tape.leaves) {
     Real* row = rows + at(leaf.row) * lanes;
-    for (std::size_t lane = 0; lane < lanes; ++lane) {
-      const int player = tape.players[lane < tape.players.size() ? lane : 0];
-      switch (leaf.kind) {
-        case LeafKind::action:
-          row[lane] = leaves.points[player * leaves.stride + leaf.index[lane]];
-          break;
-        case LeafKind::velocity:
-          row[lane] = leaves.velocities[leaf.index[lane]];
-          break;
-        case LeafKind::time:
-          row[lane] = leaves.time;
-          break;
-        case LeafKind::parameter:
-          row[lane] = leaves.parameters[leaf.index[lane]];
-          break;
-      }
+    const int* index = leaf.index.data();
+    const auto gather = [&](const Real* values) {
+      for (std::size_t lane = 0; lane < players; ++lane) row[lane] = values[index[lane]];
+    };
+    switch (leaf.kind) {
+      case LeafKind::action:
+        for (std::size_t lane = 0; lane < players; ++lane) {
+          row[lane] = leaves.points[tape.players[lane] * leaves.stride + index[lane]];
+        }
+        break;
+      case LeafKind::velocity:
+        gather(leaves.velocities);
+        break;
+      case LeafKind::time:
+        std::fill_n(row, players, leaves.time);
+        break;
+      case LeafKind::parameter:
+        gather(leaves.parameters);
+        break;
+      case LeafKind::held:
+        gather(leaves.held);
+        break;
     }
+    std::fill(row + players, row + lanes, row[0]);
   }
-  kernels().run_tape(static_cast<int>(tape.code.size()), tape.code.data(), tape.lanes, rows);
+  kernels().run_tape(static_cast<int>(tape.code.size()), tape.code.data(), tape.lanes, static_cast<int>(players), rows);
   for (const ResultRow& wanted : tape.results) {
     const Real* row = rows + at(wanted.row) * lanes;
     for (std::size_t lane = 0; lane < wanted.place.size(); ++lane) result[wanted.place[lane]] = row[lane];

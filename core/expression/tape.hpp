@@ -17,6 +17,7 @@ struct LeafValues {
   const Real* velocities = nullptr;  ///< at entry(j, h); of second-order players
   Real time = 0.0;
   const Real* parameters = nullptr;
+  const Real* held = nullptr;  ///< by the switches
 };
 
 /// What one player wants evaluated: nodes of its graph, and where their values go.
@@ -44,7 +45,7 @@ class Tapes {
   struct LeafRow {
     int row;
     LeafKind kind;
-    std::vector<int> index;  ///< by lane
+    std::vector<int> index;  ///< by lane of a player
   };
   struct ResultRow {
     int row;
@@ -52,7 +53,7 @@ class Tapes {
   };
   struct Tape {
     std::vector<int> players;  ///< by lane
-    int lanes = 0;             ///< with empty ones at the end: whole vectors
+    int lanes = 0;             ///< with ones at the end that repeat the first: whole vectors
     int rows = 0;
     std::vector<TapeInstruction> code;
     std::vector<LeafRow> leaves;

@@ -19,7 +19,7 @@ struct Place {
   int coordinate;  ///< l, from zero; -1 where there is none
 };
 
-/// The node of the expression. Throws ExpressionError that names what has no meaning there.
+/// The node of the expression; the graph has its switches. Throws ExpressionError that names what has no meaning there.
 int unroll(const Syntax& syntax, const Place& place, ExpressionGraph& graph);
 
 /// Whether a name is taken by the language, so that no parameter can have it.

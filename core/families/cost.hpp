@@ -21,9 +21,10 @@ class Cost : public GameFamily {
 
   /// gradient[own entry (h, l)] = d f_i / d x_il at the joint action points + h * stride, for every hosted player
   /// i = host(h). A stride of N D evaluates each player at its own estimate y_i, a stride of 0 all players at one x.
-  virtual void own_gradients(const Real* points, int stride, Real* gradient) const = 0;
-  virtual void own_gradients(const CoefficientsAs<Dual>& coefficients, const Dual* points, int stride,
-                             Dual* gradient) const = 0;
+  /// Switches have the values that are held, or, without any, those that they have at the points.
+  virtual void own_gradients(const Real* points, int stride, Real* gradient, const Real* held = nullptr) const = 0;
+  virtual void own_gradients(const CoefficientsAs<Dual>& coefficients, const Dual* points, int stride, Dual* gradient,
+                             const Real* held = nullptr) const = 0;
   virtual void own_gradients(const CoefficientsAs<Dependencies>& coefficients, const Dependencies* points, int stride,
                              Dependencies* gradient) const = 0;
 
@@ -31,7 +32,7 @@ class Cost : public GameFamily {
   [[nodiscard]] virtual const SparseRows& hessian_pattern() const = 0;
 
   /// The entries of hessian_pattern(), row (h, l) at the joint action points + h * stride.
-  virtual void hessian_rows(const Real* points, int stride, Real* values) const = 0;
+  virtual void hessian_rows(const Real* points, int stride, Real* values, const Real* held = nullptr) const = 0;
 
   /// Whether the gradients are affine, so that the Hessian is the same everywhere.
   [[nodiscard]] virtual bool is_affine() const = 0;

@@ -17,9 +17,11 @@ class Disturbance : public GameFamily {
   /// The absolute time [s] from which every t below counts; call refresh() after changing it.
   Real time_origin = 0.0;
 
-  /// d[own entry] = d_il(time_origin + t) of the hosted players; t in seconds.
-  virtual void values(Real t, Real* d) const = 0;
-  virtual void values(const CoefficientsAs<Dual>& coefficients, const Dual& t, Dual* d) const = 0;
+  /// d[own entry] = d_il(time_origin + t) of the hosted players; t in seconds. Switches have the values that are held,
+  /// or, without any, those that they have just after t.
+  virtual void values(Real t, Real* d, const Real* held = nullptr) const = 0;
+  virtual void values(const CoefficientsAs<Dual>& coefficients, const Dual& t, Dual* d,
+                      const Real* held = nullptr) const = 0;
   virtual void values(const CoefficientsAs<Dependencies>& coefficients, const Dependencies& t,
                       Dependencies* d) const = 0;
 };

@@ -2,16 +2,27 @@
 
 namespace mixed_order_game {
 
-void ExpressionDisturbance::values(Real t, Real* d) const {
+LeafValues ExpressionDisturbance::leaves(Real t, const Real* held) const {
+  LeafValues leaves{.time = time_origin + t, .parameters = coefficients.named.data(), .held = held};
+  if (held == nullptr && switching_.count() != 0) {
+    switching_.own_values(leaves, time_origin, t, held_there_.data());
+    leaves.held = held_there_.data();
+  }
+  return leaves;
+}
+
+void ExpressionDisturbance::values(Real t, Real* d, const Real* held) const {
   SinusoidalDisturbance::values(t, d);
   scratch_.assign(at(own_entries()), 0.0);
-  values_.values({.time = t, .parameters = coefficients.named.data()}, scratch_.data());
+  values_.values(leaves(t, held), scratch_.data());
   for (std::size_t p = 0; p < scratch_.size(); ++p) d[p] += scratch_[p];
 }
 
-void ExpressionDisturbance::values(const CoefficientsAs<Dual>& along, const Dual& t, Dual* d) const {
+void ExpressionDisturbance::values(const CoefficientsAs<Dual>& along, const Dual& t, Dual* d, const Real* held) const {
   SinusoidalDisturbance::values(along, t, d);
-  values_.add_values({.time = &t, .coefficients = &along}, d);
+  const Dual absolute = time_origin + t;
+  if (held == nullptr) held = leaves(t.value, nullptr).held;
+  values_.add_values({.time = &absolute, .coefficients = &along, .held = held}, d);
 }
 
 void ExpressionDisturbance::values(const CoefficientsAs<Dependencies>& of, const Dependencies& t,

@@ -1,6 +1,7 @@
 // What costs, unknown dynamics and disturbances have in common: coefficients that they declare.
 #pragma once
 
+#include "expression/switching.hpp"
 #include "families/coefficients.hpp"
 
 namespace mixed_order_game {
@@ -14,6 +15,12 @@ class GameFamily {
 
   /// Rebuilds what is derived from coefficients; called after any of them changed.
   virtual void refresh() = 0;
+
+  /// The switches of its expressions.
+  [[nodiscard]] virtual const Switching& switching() const {
+    static const Switching none;
+    return none;
+  }
 
  protected:
   GameFamily(const GameFamily&) = default;

@@ -63,11 +63,12 @@ void PolynomialDynamics::values_as(const Scalar* x, Gain gain_of, Scalar* g) con
   }
 }
 
-void PolynomialDynamics::values(const Real* x, const Real* /*v*/, Real* g) const {
+void PolynomialDynamics::values(const Real* x, const Real* /*v*/, Real* g, const Real* /*held*/) const {
   values_as(x, [&](int i) { return coefficients[gain][at(i)]; }, g);
 }
 
-void PolynomialDynamics::values(const CoefficientsAs<Dual>& along, const Dual* x, const Dual* /*v*/, Dual* g) const {
+void PolynomialDynamics::values(const CoefficientsAs<Dual>& along, const Dual* x, const Dual* /*v*/, Dual* g,
+                                const Real* /*held*/) const {
   values_as(x, [&](int i) { return along.value(gain, i); }, g);
 }
 
@@ -76,7 +77,7 @@ void PolynomialDynamics::values(const CoefficientsAs<Dependencies>& of, const De
   values_as(x, [&](int i) { return of.value(gain, i); }, g);
 }
 
-void PolynomialDynamics::jacobian(const Real* x, const Real* /*v*/, Real* values) const {
+void PolynomialDynamics::jacobian(const Real* x, const Real* /*v*/, Real* values, const Real* /*held*/) const {
   for (int row = 0; row < pattern_.rows(); ++row) {
     for (int k = pattern_.start[at(row)]; k < pattern_.start[at(row + 1)]; ++k) {
       const Real xj = x[pattern_.column[at(k)]];

@@ -13,14 +13,16 @@ class PolynomialDynamics : public UnknownDynamics {
 
   [[nodiscard]] std::unique_ptr<UnknownDynamics> clone() const override;
   void refresh() override;
-  void values(const Real* x, const Real* v, Real* g) const override;
-  void values(const CoefficientsAs<Dual>& along, const Dual* x, const Dual* v, Dual* g) const override;
+  void values(const Real* x, const Real* v, Real* g, const Real* held = nullptr) const override;
+  void values(const CoefficientsAs<Dual>& along, const Dual* x, const Dual* v, Dual* g,
+              const Real* held = nullptr) const override;
   void values(const CoefficientsAs<Dependencies>& of, const Dependencies* x, const Dependencies* v,
               Dependencies* g) const override;
   [[nodiscard]] const SparseRows& jacobian_pattern() const override { return pattern_; }
-  void jacobian(const Real* x, const Real* v, Real* values) const override;
+  void jacobian(const Real* x, const Real* v, Real* values, const Real* held = nullptr) const override;
   [[nodiscard]] const SparseRows& velocity_pattern() const override { return no_velocities_; }
-  void velocity_jacobian(const Real* /*x*/, const Real* /*v*/, Real* /*values*/) const override {}
+  void velocity_jacobian(const Real* /*x*/, const Real* /*v*/, Real* /*values*/,
+                         const Real* /*held*/ = nullptr) const override {}
   [[nodiscard]] std::vector<int> actions_used() const override { return pattern_.column; }
   [[nodiscard]] std::vector<int> velocities_used() const override { return {}; }
 

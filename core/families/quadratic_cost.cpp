@@ -64,7 +64,7 @@ Real QuadraticCost::value(int i, const Real* x) const {
   return cost;
 }
 
-void QuadraticCost::own_gradients(const Real* points, int stride, Real* gradient) const {
+void QuadraticCost::own_gradients(const Real* points, int stride, Real* gradient, const Real* /*held*/) const {
   const std::vector<Real>& q = coefficients[quadratic];
   const int hosts = static_cast<int>(host_.size());
   for (int l = 0; l < shape_.dimension; ++l) {
@@ -101,8 +101,8 @@ void QuadraticCost::own_gradients_as(const CoefficientsAs<Scalar>& coefficients_
   }
 }
 
-void QuadraticCost::own_gradients(const CoefficientsAs<Dual>& along, const Dual* points, int stride,
-                                  Dual* gradient) const {
+void QuadraticCost::own_gradients(const CoefficientsAs<Dual>& along, const Dual* points, int stride, Dual* gradient,
+                                  const Real* /*held*/) const {
   own_gradients_as(along, points, stride, gradient);
 }
 
@@ -111,7 +111,7 @@ void QuadraticCost::own_gradients(const CoefficientsAs<Dependencies>& of, const 
   own_gradients_as(of, points, stride, gradient);
 }
 
-void QuadraticCost::hessian_rows(const Real* /*points*/, int /*stride*/, Real* values) const {
+void QuadraticCost::hessian_rows(const Real* /*points*/, int /*stride*/, Real* values, const Real* /*held*/) const {
   std::copy(hessian_.begin(), hessian_.end(), values);
 }
 

@@ -14,12 +14,13 @@ class QuadraticCost : public Cost {
   [[nodiscard]] std::unique_ptr<Cost> clone() const override;
   void refresh() override;
   [[nodiscard]] Real value(int i, const Real* x) const override;
-  void own_gradients(const Real* points, int stride, Real* gradient) const override;
-  void own_gradients(const CoefficientsAs<Dual>& along, const Dual* points, int stride, Dual* gradient) const override;
+  void own_gradients(const Real* points, int stride, Real* gradient, const Real* held = nullptr) const override;
+  void own_gradients(const CoefficientsAs<Dual>& along, const Dual* points, int stride, Dual* gradient,
+                     const Real* held = nullptr) const override;
   void own_gradients(const CoefficientsAs<Dependencies>& of, const Dependencies* points, int stride,
                      Dependencies* gradient) const override;
   [[nodiscard]] const SparseRows& hessian_pattern() const override { return pattern_; }
-  void hessian_rows(const Real* points, int stride, Real* values) const override;
+  void hessian_rows(const Real* points, int stride, Real* values, const Real* held = nullptr) const override;
   [[nodiscard]] bool is_affine() const override { return true; }
 
  protected:

@@ -71,7 +71,7 @@ Dependencies SinusoidalDisturbance::phase_at_origin(const CoefficientsAs<Depende
   return of.value(frequency, entry) * time_origin + of.value(phase, entry);
 }
 
-void SinusoidalDisturbance::values(Real t, Real* d) const {
+void SinusoidalDisturbance::values(Real t, Real* d, const Real* /*held*/) const {
   kernels().sinusoid(own_entries(), t, amplitude_.data(), frequency_.data(), phase_at_origin_.data(), bias_.data(), d);
 }
 
@@ -84,7 +84,8 @@ void SinusoidalDisturbance::values_as(const CoefficientsAs<Scalar>& of, const Sc
   }
 }
 
-void SinusoidalDisturbance::values(const CoefficientsAs<Dual>& along, const Dual& t, Dual* d) const {
+void SinusoidalDisturbance::values(const CoefficientsAs<Dual>& along, const Dual& t, Dual* d,
+                                   const Real* /*held*/) const {
   values_as(along, t, d);
 }
 

@@ -13,8 +13,8 @@ class SinusoidalDisturbance : public Disturbance {
 
   [[nodiscard]] std::unique_ptr<Disturbance> clone() const override;
   void refresh() override;
-  void values(Real t, Real* d) const override;
-  void values(const CoefficientsAs<Dual>& along, const Dual& t, Dual* d) const override;
+  void values(Real t, Real* d, const Real* held = nullptr) const override;
+  void values(const CoefficientsAs<Dual>& along, const Dual& t, Dual* d, const Real* held = nullptr) const override;
   void values(const CoefficientsAs<Dependencies>& of, const Dependencies& t, Dependencies* d) const override;
 
  protected:

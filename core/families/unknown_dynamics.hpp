@@ -16,9 +16,10 @@ class UnknownDynamics : public GameFamily {
   using GameFamily::GameFamily;
   [[nodiscard]] virtual std::unique_ptr<UnknownDynamics> clone() const = 0;
 
-  /// g[own entry] = g_il(x, v).
-  virtual void values(const Real* x, const Real* v, Real* g) const = 0;
-  virtual void values(const CoefficientsAs<Dual>& coefficients, const Dual* x, const Dual* v, Dual* g) const = 0;
+  /// g[own entry] = g_il(x, v). Switches have the values that are held, or, without any, those that they have there.
+  virtual void values(const Real* x, const Real* v, Real* g, const Real* held = nullptr) const = 0;
+  virtual void values(const CoefficientsAs<Dual>& coefficients, const Dual* x, const Dual* v, Dual* g,
+                      const Real* held = nullptr) const = 0;
   virtual void values(const CoefficientsAs<Dependencies>& coefficients, const Dependencies* x, const Dependencies* v,
                       Dependencies* g) const = 0;
 
@@ -26,11 +27,11 @@ class UnknownDynamics : public GameFamily {
   [[nodiscard]] virtual const SparseRows& jacobian_pattern() const = 0;
 
   /// The entries of jacobian_pattern().
-  virtual void jacobian(const Real* x, const Real* v, Real* values) const = 0;
+  virtual void jacobian(const Real* x, const Real* v, Real* values, const Real* held = nullptr) const = 0;
 
   /// The same along v.
   [[nodiscard]] virtual const SparseRows& velocity_pattern() const = 0;
-  virtual void velocity_jacobian(const Real* x, const Real* v, Real* values) const = 0;
+  virtual void velocity_jacobian(const Real* x, const Real* v, Real* values, const Real* held = nullptr) const = 0;
 
   /// Entries of x and of v that are looked at, in any order, repeats allowed.
   [[nodiscard]] virtual std::vector<int> actions_used() const = 0;

@@ -15,6 +15,8 @@ namespace mixed_order_game {
 
 extern const Kernels MIXED_ORDER_GAME_JOIN(kernels_, MIXED_ORDER_GAME_LEVEL);
 
+double noise(double seed, double k);  // of expression/noise.hpp
+
 namespace {
 
 // clang-format off: the order matters

@@ -3,17 +3,27 @@
 // exp, tanh and sin are those of elementary.ipp, with the same bits on every level; the others are those of the C
 // library, number by number.
 
+/// Lanes come in eights, and no row is its own operand: that leaves nothing to look out for.
 template <typename Function>
 inline void for_each_lane(int lanes, const double* a, const double* b, double* out, Function function) {
-  for (int k = 0; k < lanes; ++k) out[k] = function(a[k], b[k]);
+  constexpr int block = 8;
+  for (int first = 0; first < lanes; first += block) {
+    double value[block];
+    for (int k = 0; k < block; ++k) value[k] = function(a[first + k], b[first + k]);
+    for (int k = 0; k < block; ++k) out[first + k] = value[k];
+  }
 }
 
-void run_tape(int count, const TapeInstruction* code, int lanes, double* rows) {
+void run_tape(int count, const TapeInstruction* code, int lanes, int used, double* rows) {
   for (const TapeInstruction* step = code; step != code + count; ++step) {
     const double* a = rows + static_cast<Index>(step->a) * lanes;
     const double* b = rows + static_cast<Index>(step->b) * lanes;
     double* out = rows + static_cast<Index>(step->row) * lanes;
     const auto each = [=](auto function) { for_each_lane(lanes, a, b, out, function); };
+    const auto each_used = [=](auto function) {
+      for (int k = 0; k < used; ++k) out[k] = function(a[k], b[k]);
+      for (int k = used; k < lanes; ++k) out[k] = out[0];
+    };
     switch (step->operation) {
       case Operation::number:
       case Operation::leaf:
@@ -37,10 +47,10 @@ void run_tape(int count, const TapeInstruction* code, int lanes, double* rows) {
         each([](double x, double) { return sqrt(x); });
         break;
       case Operation::power:
-        each([](double x, double y) { return pow(x, y); });
+        each_used([](double x, double y) { return pow(x, y); });
         break;
       case Operation::power_log:
-        each([](double x, double y) { return x == 0.0 ? 0.0 : pow(x, y) * log(x); });
+        each_used([](double x, double y) { return x == 0.0 ? 0.0 : pow(x, y) * log(x); });
         break;
       case Operation::exp:
         exponential(lanes, a, out);
@@ -49,13 +59,13 @@ void run_tape(int count, const TapeInstruction* code, int lanes, double* rows) {
         }
         break;
       case Operation::expm1:
-        each([](double x, double) { return expm1(x); });
+        each_used([](double x, double) { return expm1(x); });
         break;
       case Operation::log:
-        each([](double x, double) { return log(x); });
+        each_used([](double x, double) { return log(x); });
         break;
       case Operation::log1p:
-        each([](double x, double) { return log1p(x); });
+        each_used([](double x, double) { return log1p(x); });
         break;
       case Operation::sin:
         for_each_vector(lanes, a, out, sin_of);
@@ -64,37 +74,76 @@ void run_tape(int count, const TapeInstruction* code, int lanes, double* rows) {
         }
         break;
       case Operation::cos:
-        each([](double x, double) { return cos(x); });
+        each_used([](double x, double) { return cos(x); });
         break;
       case Operation::tan:
-        each([](double x, double) { return tan(x); });
+        each_used([](double x, double) { return tan(x); });
         break;
       case Operation::asin:
-        each([](double x, double) { return asin(x); });
+        each_used([](double x, double) { return asin(x); });
         break;
       case Operation::acos:
-        each([](double x, double) { return acos(x); });
+        each_used([](double x, double) { return acos(x); });
         break;
       case Operation::atan:
-        each([](double x, double) { return atan(x); });
+        each_used([](double x, double) { return atan(x); });
         break;
       case Operation::atan2:
-        each([](double x, double y) { return atan2(x, y); });
+        each_used([](double x, double y) { return atan2(x, y); });
         break;
       case Operation::sinh:
-        each([](double x, double) { return sinh(x); });
+        each_used([](double x, double) { return sinh(x); });
         break;
       case Operation::cosh:
-        each([](double x, double) { return cosh(x); });
+        each_used([](double x, double) { return cosh(x); });
         break;
       case Operation::tanh:
         for_each_vector(lanes, a, out, tanh_of);
         break;
       case Operation::erf:
-        each([](double x, double) { return erf(x); });
+        each_used([](double x, double) { return erf(x); });
         break;
       case Operation::hypot:
-        each([](double x, double y) { return hypot(x, y); });
+        each_used([](double x, double y) { return hypot(x, y); });
+        break;
+      case Operation::abs:
+        each([](double x, double) { return fabs(x); });
+        break;
+      case Operation::min:
+        each([](double x, double y) { return y < x ? y : x; });
+        break;
+      case Operation::max:
+        each([](double x, double y) { return y > x ? y : x; });
+        break;
+      case Operation::floor:
+        each([](double x, double) { return floor(x); });
+        break;
+      case Operation::sign_of:
+        each([](double x, double) { return x >= 0.0 ? 1.0 : -1.0; });
+        break;
+      case Operation::positive:
+        each([](double x, double) { return x > 0.0 ? 1.0 : 0.0; });
+        break;
+      case Operation::not_negative:
+        each([](double x, double) { return x >= 0.0 ? 1.0 : 0.0; });
+        break;
+      case Operation::sign:
+        each([](double x, double) { return x > 0.0 ? 1.0 : x < 0.0 ? -1.0 : 0.0; });
+        break;
+      case Operation::choose:
+        each([](double x, double y) { return x != 0.0 ? y : 0.0; });
+        break;
+      case Operation::multiply_unless_zero:
+        each([](double x, double y) { return x != 0.0 ? x * y : 0.0; });
+        break;
+      case Operation::usable:
+        each([](double x, double) { return x - x == 0.0 ? 1.0 : 0.0; });
+        break;
+      case Operation::alternating:
+        each([](double x, double) { return x == 2.0 * floor(0.5 * x) ? 1.0 : -1.0; });
+        break;
+      case Operation::noise:
+        each_used(noise);
         break;
     }
   }

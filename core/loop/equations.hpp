@@ -46,7 +46,8 @@ class LoopEquations {
         estimates_of_(at(parameters.shape.players)) {}
 
   /// What every hosted player computes from its own state, estimates and inputs: the signals up to the control.
-  void evaluate_control(const LoopNumbers<Scalar>& number, const Scalar* state, const Scalar* input);
+  void evaluate_control(const LoopNumbers<Scalar>& number, const Scalar* state, const Scalar* input,
+                        const Modes& modes);
 
   /// After it, the rates of the state at time t [s]; modes at own entries.
   void evaluate_rates(const LoopNumbers<Scalar>& number, const Scalar& t, const Scalar* state, const Scalar* input,
@@ -63,13 +64,32 @@ class LoopEquations {
   static bool is_outward(const Dual& e, const Dual& network) { return e.value * network.value >= 0.0; }
   static bool is_outward(const Dependencies&, const Dependencies&) { return true; }
 
+  /// Terms of a family with what its switches hold; what a term depends on does not depend on that.
+  void evaluate_gradient(const CoefficientsAs<Dual>& of, const Dual* y, const Modes& modes) {
+    parameters_.cost->own_gradients(of, y, parameters_.shape.actions(), gradient.data(), held(0, modes));
+  }
+  void evaluate_gradient(const CoefficientsAs<Dependencies>& of, const Dependencies* y, const Modes&) {
+    parameters_.cost->own_gradients(of, y, parameters_.shape.actions(), gradient.data());
+  }
+  void evaluate_drift(const LoopNumbers<Dual>& number, const Dual& t, const Dual* x, const Dual* v,
+                      const Modes& modes) {
+    parameters_.dynamics->values(*number.dynamics, x, v, dynamics.data(), held(1, modes));
+    parameters_.disturbance->values(*number.disturbance, t, disturbance.data(), held(2, modes));
+  }
+  void evaluate_drift(const LoopNumbers<Dependencies>& number, const Dependencies& t, const Dependencies* x,
+                      const Dependencies* v, const Modes&) {
+    parameters_.dynamics->values(*number.dynamics, x, v, dynamics.data());
+    parameters_.disturbance->values(*number.disturbance, t, disturbance.data());
+  }
+  const Real* held(int family, const Modes& modes) const { return modes.data() + parameters_.first_switch(family); }
+
   const Parameters& parameters_;
   std::vector<const Scalar*> estimates_of_;  // by player; scratch
 };
 
 template <typename Scalar>
 void LoopEquations<Scalar>::evaluate_control(const LoopNumbers<Scalar>& number, const Scalar* state,
-                                             const Scalar* input) {
+                                             const Scalar* input, const Modes& modes) {
   const Shape& shape = parameters_.shape;
   const GainsAs<Scalar>& gains = number.gains;
   const int n = shape.actions();
@@ -83,7 +103,7 @@ void LoopEquations<Scalar>::evaluate_control(const LoopNumbers<Scalar>& number, 
       shared[at(shape.entry(inputs.heard()[k], l))] = input[inputs.xbar_of(static_cast<int>(k)) + l];
     }
   }
-  parameters_.cost->own_gradients(*number.cost, y, n, gradient.data());
+  evaluate_gradient(*number.cost, y, modes);
   for (int h = 0; h < shape.hosts(); ++h) {
     for (int m = 0; m < shape.neurons; ++m) {
       const int i = shape.host(h);
@@ -121,8 +141,7 @@ void LoopEquations<Scalar>::evaluate_rates(const LoopNumbers<Scalar>& number, co
   const Shape& shape = parameters_.shape;
   const GainsAs<Scalar>& gains = number.gains;
   const int n = shape.actions();
-  parameters_.dynamics->values(*number.dynamics, x.data(), reference.data(), dynamics.data());
-  parameters_.disturbance->values(*number.disturbance, t, disturbance.data());
+  evaluate_drift(number, t, x.data(), reference.data(), modes);
   for (int p = 0; p < shape.own_entries(); ++p) {
     const int i = shape.player_of_own(p);
     const bool second = shape.is_second_order(i);

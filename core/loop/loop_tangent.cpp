@@ -81,7 +81,7 @@ void LoopTangent::evaluate(const Parameters* direction, Real t, const Real* at_s
 
   for (std::size_t k = 0; k < state.size(); ++k) state_[k] = {at_state[k], state[k]};
   for (std::size_t k = 0; k < inputs.size(); ++k) inputs_[k] = {at_inputs[k], inputs[k]};
-  equations_.evaluate_control(numbers_, state_.data(), inputs_.data());
+  equations_.evaluate_control(numbers_, state_.data(), inputs_.data(), modes);
   equations_.evaluate_rates(numbers_, {t, time}, state_.data(), inputs_.data(), modes, rate_.data());
   for (std::size_t p = 0; p < control.size(); ++p) control[p] = equations_.control[p].along;
   for (std::size_t k = 0; k < rate.size(); ++k) rate[k] = rate_[k].along;

@@ -2,6 +2,7 @@
 #include <fmi2Functions.h>
 
 #include <algorithm>
+#include <cmath>
 #include <memory>
 #include <span>
 #include <string>
@@ -381,8 +382,9 @@ fmi2Status fmi2NewDiscreteStates(fmi2Component c, fmi2EventInfo* eventInfo) {
     info.terminateSimulation = fmi2False;
     info.nominalsOfContinuousStatesChanged = fmi2False;
     info.valuesOfContinuousStatesChanged = moved ? fmi2True : fmi2False;
-    info.nextEventTimeDefined = fmi2False;  // disturbances are smooth in time
-    info.nextEventTime = 0.0;
+    const Real next = component.instance.next_event();
+    info.nextEventTimeDefined = std::isfinite(next) ? fmi2True : fmi2False;
+    info.nextEventTime = std::isfinite(next) ? next : 0.0;
   }));
 }
 

@@ -4,6 +4,7 @@
 #include <set>
 #include <sstream>
 
+#include "located_conditions.hpp"
 #include "logger.hpp"
 #include "model_structure.hpp"
 
@@ -53,8 +54,8 @@ void write_head(xml_node root, const Model& model) {
   attribute(root, "license", "BSD-3-Clause, see documentation/licenses");
   attribute(root, "generationTool", tool);
   attribute(root, "variableNamingConvention", "structured");
-  const int columns = model.offers_model_exchange() ? model.game.parameters.shape.own_entries() : 0;
-  attribute(root, "numberOfEventIndicators", std::to_string(columns));
+  const int located = model.offers_model_exchange() ? LocatedConditions::located(model.game.parameters) : 0;
+  attribute(root, "numberOfEventIndicators", std::to_string(located));
 
   if (model.offers_model_exchange()) {
     xml_node model_exchange = root.append_child("ModelExchange");

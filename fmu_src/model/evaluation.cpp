@@ -8,6 +8,7 @@ namespace mixed_order_game {
 
 Evaluation::Evaluation(const Game& game)
     : loop_(game.parameters),
+      conditions_(loop_),
       inputs_(loop_.inputs().size()),
       signals_(loop_.shape()),
       rate_(at(loop_.layout().size())),
@@ -65,7 +66,8 @@ void Evaluation::prepare_signals(const Standing& standing) {
 
 // Of the signals it writes those of seeking only, which prepare_signals finds for the same state.
 void Evaluation::event_indicators(const Standing& standing, Real tolerance, Real* values) {
-  loop_.event_functions(standing.state, inputs_at(standing), *standing.modes, tolerance, signals_, values);
+  conditions_.event_functions(standing.since_origin, standing.state, inputs_at(standing), *standing.modes, tolerance,
+                              signals_, values);
 }
 
 void Evaluation::prepare_equilibrium(Settings& settings) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "closed_loop.hpp"
+#include "located_conditions.hpp"
 #include "loop/inputs.hpp"
 #include "settings.hpp"
 
@@ -22,6 +23,7 @@ class Evaluation {
   Evaluation& operator=(const Evaluation&) = delete;
 
   [[nodiscard]] const ClosedLoop& loop() const { return loop_; }
+  [[nodiscard]] const LocatedConditions& conditions() const { return conditions_; }
   [[nodiscard]] const Inputs& inputs() const { return inputs_; }
   /// The values of those that act, where the run stands.
   const Real* inputs_at(const Standing& standing);
@@ -39,7 +41,7 @@ class Evaluation {
   /// Computes what the variables of a stage need.
   void prepare(Stage stage, Settings& settings, const Standing& standing);
   void prepare_signals(const Standing& standing);
-  /// One for each weight column, as ClosedLoop::event_functions.
+  /// As LocatedConditions::event_functions.
   void event_indicators(const Standing& standing, Real tolerance, Real* values);
   /// Throws GameError when the game has no unique equilibrium.
   void prepare_equilibrium(Settings& settings);
@@ -51,6 +53,7 @@ class Evaluation {
 
  private:
   ClosedLoop loop_;
+  LocatedConditions conditions_;
   Inputs inputs_;
 
   bool signals_valid_ = false;

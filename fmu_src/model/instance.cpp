@@ -52,7 +52,7 @@ Instance::Instance(Model model, Interface interface)
       evaluation_(model_.game),
       directional_derivative_(model_, evaluation_.loop()),
       initial_state_(at(evaluation_.loop().layout().size())),
-      initial_modes_(at(evaluation_.loop().shape().own_entries())) {}
+      initial_modes_(at(LocatedConditions::count(model_.game.parameters))) {}
 
 Standing Instance::standing() const {
   if (co_simulation_) return co_simulation_->standing();
@@ -333,7 +333,10 @@ void Instance::act() {
   } else {
     evaluation_.act(settings_.inputs);
   }
-  if (!model_exchange_) evaluation_.loop().initial_state(initial_state_.data());
+  if (!model_exchange_) {
+    evaluation_.loop().initial_state(initial_state_.data());
+    evaluation_.conditions().begin(0.0, initial_state_.data(), evaluation_.inputs_at(standing()), initial_modes_);
+  }
   touched_ = Change::none;
 }
 
@@ -371,6 +374,7 @@ void Instance::check_settings() {
   }
   require_moderate_factors(graph);
   require_bounded_weights(settings_.parameters);
+  settings_.parameters.judge_switching();
   if (hosts_all) evaluation_.prepare_equilibrium(settings_);
 }
 
@@ -409,7 +413,7 @@ void Instance::enter_continuous_time_mode() {
 
 // Integrators evaluate the model beyond the stop time and interpolate back, so that not the time is judged but the
 // step. They locate where an event indicator changes its sign. An indicator that is positive when a step is complete
-// was passed over; what is due is then done at once.
+// was passed over, and so is an event at a known time that the importer did not heed; what is due is then done at once.
 bool Instance::completed_integrator_step() {
   const Real t = model_exchange_->standing().time;
   const auto& [tolerance, start, stop] = experiment_;
@@ -417,7 +421,8 @@ bool Instance::completed_integrator_step() {
     throw Error("the step ends at " + text_of(t) + ", after the stop time " + text_of(*stop));
   }
   const std::span<const Real> indicators = event_indicators();
-  return std::any_of(indicators.begin(), indicators.end(), [](Real indicator) { return indicator > 0.0; });
+  return model_exchange_->is_event_due() ||
+         std::any_of(indicators.begin(), indicators.end(), [](Real indicator) { return indicator > 0.0; });
 }
 
 void Instance::set_time(Real t) {
@@ -454,7 +459,7 @@ void Instance::get_derivatives(std::span<Real> rate) {
 
 std::span<const Real> Instance::event_indicators() {
   act();
-  scratch_.resize(initial_modes_.size());
+  scratch_.resize(at(LocatedConditions::located(model_.game.parameters)));
   evaluation_.event_indicators(standing(), tolerances().relative, scratch_.data());
   if (!std::all_of(scratch_.begin(), scratch_.end(), [](Real value) { return std::isfinite(value); })) {
     throw NotComputable("an event indicator is not finite");
@@ -463,7 +468,7 @@ std::span<const Real> Instance::event_indicators() {
 }
 
 void Instance::get_event_indicators(std::span<Real> values) {
-  require_length(values.size(), "event indicators", initial_modes_.size());
+  require_length(values.size(), "event indicators", at(LocatedConditions::located(model_.game.parameters)));
   std::ranges::copy(event_indicators(), values.begin());
 }
 
@@ -490,7 +495,7 @@ SnapshotShape Instance::snapshot_shape() const {
   return {.interface = interface_,
           .settings = model_.variables.saved_size(),
           .states = initial_state_.size(),
-          .modes = initial_modes_.size(),
+          .parameters = &model_.game.parameters,
           .steps = Integrator::most_steps_between_restarts(static_cast<int>(initial_state_.size()))};
 }
 

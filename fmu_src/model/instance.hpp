@@ -65,6 +65,8 @@ class Instance {
   void enter_event_mode() { phase_ = Phase::event_mode; }
   /// True when the state moved.
   bool new_discrete_states();
+  /// The absolute time of the next event that is known beforehand; infinite when there is none.
+  [[nodiscard]] Real next_event() const { return model_exchange_->next_event(); }
   void enter_continuous_time_mode();
   /// True when event mode has to be entered.
   bool completed_integrator_step();

@@ -36,12 +36,22 @@ void ModelExchange::set_state(std::span<const Real> state) {
   evaluation_.moved();
 }
 
+Real ModelExchange::next_event() const {
+  return evaluation_.conditions().next_event(standing().since_origin, point_.modes);
+}
+
+bool ModelExchange::is_event_due() const {
+  return evaluation_.conditions().is_due(standing().since_origin, point_.modes);
+}
+
 bool ModelExchange::update_modes(Real tolerance) {
   const ClosedLoop& loop = evaluation_.loop();
   Signals signals(loop.shape());
   Modes modes = point_.modes;
   const Real* inputs = evaluation_.inputs_at(standing());
-  point_.events += loop.resolve_modes(point_.state.data(), inputs, tolerance, signals, modes);
+  point_.events += evaluation_.conditions()
+                       .pass(standing().since_origin, point_.state.data(), inputs, tolerance, nullptr, signals, modes)
+                       .events;
   AlignedVector state = point_.state;
   loop.project(modes, inputs, signals, state.data());
   const bool moved = state != point_.state;

@@ -16,7 +16,7 @@ class ModelExchange {
     Real time = 0.0;
     AlignedVector state;
     Modes modes;
-    std::int64_t events = 0;  ///< columns that entered or left the sphere
+    std::int64_t events = 0;  ///< columns that entered or left the sphere, and switches of expressions
   };
 
   /// The evaluation must outlive the run.
@@ -27,9 +27,14 @@ class ModelExchange {
   void set_time(Real t);
   void set_state(std::span<const Real> state);
 
-  /// Gives each column the mode that it has from here on, as ClosedLoop::resolve_modes, and puts the state within the
-  /// bound: a column that enters lies exactly on the sphere then. True when that moved the state.
+  /// Gives each condition the mode that it has from here on and puts the state within the bound: a column that enters
+  /// lies exactly on the sphere then. True when that moved the state. Throws Error, and changes nothing, where a
+  /// condition slides.
   bool update_modes(Real tolerance);
+  /// The absolute time of the next event that is known beforehand; infinite when there is none.
+  [[nodiscard]] Real next_event() const;
+  /// Whether one has been passed over.
+  [[nodiscard]] bool is_event_due() const;
 
   [[nodiscard]] const Point& save() const { return point_; }
 

@@ -708,7 +708,8 @@ class ModelVariables::Builder {
     add_count("solver_steps", "Steps taken by the integrator", read_count<&Statistics::steps>);
     add_count("solver_rhs_evaluations", "Evaluations of the right-hand side",
               read_count<&Statistics::rate_evaluations>);
-    add_count("solver_events", "Weight columns that entered or left the sphere", read_count<&Statistics::events>);
+    add_count("solver_events", "Weight columns that entered or left the sphere, and conditions that changed",
+              read_count<&Statistics::events>);
     add({.name = "order",
          .description = "Order of player i: 1 velocity-driven, 2 acceleration-driven",
          .type = Type::integer,

@@ -111,9 +111,21 @@ void write_header(Writer& writer, std::string_view guid, std::uint64_t payload) 
   writer.number(payload);
 }
 
+constexpr std::uint8_t other_mode = 2;
+
+/// One byte where it is 0 or 1, as nearly always.
 void write_modes(Writer& writer, const Modes& modes) {
   writer.number(std::uint64_t{modes.size()});
-  for (const std::uint8_t mode : modes) writer.byte(mode);
+  for (const Real mode : modes) {
+    const bool is_boolean = mode == 0.0 || mode == 1.0;
+    writer.byte(is_boolean ? static_cast<std::uint8_t>(mode) : other_mode);
+    if (!is_boolean) writer.number(mode);
+  }
+}
+
+std::size_t size_of(const Modes& modes) {
+  const auto others = std::count_if(modes.begin(), modes.end(), [](Real mode) { return mode != 0.0 && mode != 1.0; });
+  return 8 + modes.size() + 8 * static_cast<std::size_t>(others);
 }
 
 void write_statistics(Writer& writer, const Statistics& statistics) {
@@ -181,9 +193,17 @@ std::int64_t read_count(Reader& reader) {
   return count;
 }
 
-void read_modes(Reader& reader, std::size_t expected, Modes& modes) {
-  if (reader.number() != expected) Reader::refuse("a list in it has another length");
-  for (std::size_t k = 0; k < expected; ++k) modes.push_back(static_cast<std::uint8_t>(reader.boolean()));
+void read_modes(Reader& reader, const Parameters& parameters, Modes& modes) {
+  const int expected = LocatedConditions::count(parameters);
+  if (reader.number() != at(expected)) Reader::refuse("a list in it has another length");
+  for (int k = 0; k < expected; ++k) {
+    const std::uint8_t byte = reader.byte();
+    if (byte > other_mode) Reader::refuse("a mode in it is neither 0 nor 1 nor another number");
+    modes.push_back(byte == other_mode ? reader.real() : byte);
+    if (!LocatedConditions::can_hold(parameters, k, modes.back())) {
+      Reader::refuse("a condition in it holds what it cannot");
+    }
+  }
 }
 
 void read_statistics(Reader& reader, Statistics& statistics) {
@@ -197,13 +217,13 @@ Checkpoint read_checkpoint(Reader& reader, const SnapshotShape& shape) {
   Checkpoint checkpoint;
   checkpoint.restart_time = reader.real();
   reader.numbers(shape.states, checkpoint.restart_state);
-  read_modes(reader, shape.modes, checkpoint.restart_modes);
+  read_modes(reader, *shape.parameters, checkpoint.restart_modes);
   read_statistics(reader, checkpoint.restart_statistics);
   checkpoint.steps_since_restart = read_count(reader);
   if (checkpoint.steps_since_restart > shape.steps) Reader::refuse("it counts too many steps");
   checkpoint.time = reader.real();
   reader.numbers(shape.states, checkpoint.state);
-  read_modes(reader, shape.modes, checkpoint.modes);
+  read_modes(reader, *shape.parameters, checkpoint.modes);
   read_statistics(reader, checkpoint.statistics);
   if (checkpoint.time < checkpoint.restart_time) Reader::refuse("its times are out of order");
   return checkpoint;
@@ -213,7 +233,7 @@ ModelExchange::Point read_model_exchange(Reader& reader, const SnapshotShape& sh
   ModelExchange::Point point;
   point.time = reader.real();
   reader.numbers(shape.states, point.state);
-  read_modes(reader, shape.modes, point.modes);
+  read_modes(reader, *shape.parameters, point.modes);
   point.events = read_count(reader);
   return point;
 }
@@ -227,11 +247,11 @@ std::size_t serialized_size(const Snapshot& snapshot, std::string_view guid) {
     const auto& [acting, time, checkpoint] = *snapshot.co_simulation;
     constexpr std::size_t statistics = 5 * 8;
     size += 8 + 8 * acting.size() + 8 + 8;
-    size += 8 + 8 * checkpoint.restart_state.size() + 8 + checkpoint.restart_modes.size() + statistics + 8;
-    size += 8 + 8 + 8 * checkpoint.state.size() + 8 + checkpoint.modes.size() + statistics;
+    size += 8 + 8 * checkpoint.restart_state.size() + size_of(checkpoint.restart_modes) + statistics + 8;
+    size += 8 + 8 + 8 * checkpoint.state.size() + size_of(checkpoint.modes) + statistics;
   }
   if (snapshot.model_exchange) {
-    size += 8 + 8 + 8 * snapshot.model_exchange->state.size() + 8 + snapshot.model_exchange->modes.size() + 8;
+    size += 8 + 8 + 8 * snapshot.model_exchange->state.size() + size_of(snapshot.model_exchange->modes) + 8;
   }
   return magic.size() + 4 + 4 + guid.size() + 8 + size + fingerprint_size;
 }

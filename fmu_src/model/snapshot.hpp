@@ -30,8 +30,8 @@ struct SnapshotShape {
   Interface interface = Interface::co_simulation;
   std::size_t settings = 0;
   std::size_t states = 0;
-  std::size_t modes = 0;
-  std::int64_t steps = 0;  ///< the most that it can ask to repeat
+  const Parameters* parameters = nullptr;  ///< whose conditions have modes
+  std::int64_t steps = 0;                  ///< the most that it can ask to repeat
 };
 
 std::size_t serialized_size(const Snapshot& snapshot, std::string_view guid);

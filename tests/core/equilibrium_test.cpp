@@ -116,8 +116,8 @@ class GradientsOnly : public Cost {
   explicit GradientsOnly(int players) : Cost(Coefficients({}, players, 1)) {}
   [[nodiscard]] Real value(int /*i*/, const Real* /*x*/) const override { return 0.0; }
   using Cost::own_gradients;
-  void own_gradients(const CoefficientsAs<Dual>& /*none*/, const Dual* /*points*/, int /*stride*/,
-                     Dual* /*gradient*/) const override {}
+  void own_gradients(const CoefficientsAs<Dual>& /*none*/, const Dual* /*points*/, int /*stride*/, Dual* /*gradient*/,
+                     const Real* /*held*/ = nullptr) const override {}
   void own_gradients(const CoefficientsAs<Dependencies>& /*none*/, const Dependencies* /*points*/, int /*stride*/,
                      Dependencies* /*gradient*/) const override {}
   void refresh() override {}
@@ -137,14 +137,15 @@ class AffineGradients final : public GradientsOnly {
   std::vector<Real> linear;
 
   [[nodiscard]] std::unique_ptr<Cost> clone() const override { return std::make_unique<AffineGradients>(*this); }
-  void own_gradients(const Real* points, int stride, Real* gradient) const override {
+  void own_gradients(const Real* points, int stride, Real* gradient, const Real* /*held*/ = nullptr) const override {
     for (int i = 0; i < players_; ++i) {
       gradient[i] = linear[at(i)];
       for (int j = 0; j < players_; ++j) gradient[i] += jacobian[at(i * players_ + j)] * points[i * stride + j];
     }
   }
   [[nodiscard]] const SparseRows& hessian_pattern() const override { return pattern_; }
-  void hessian_rows(const Real* /*points*/, int /*stride*/, Real* values) const override {
+  void hessian_rows(const Real* /*points*/, int /*stride*/, Real* values,
+                    const Real* /*held*/ = nullptr) const override {
     std::copy(jacobian.begin(), jacobian.end(), values);
   }
 
@@ -190,12 +191,12 @@ class RunawayCost final : public GradientsOnly {
  public:
   RunawayCost() : GradientsOnly(2) {}
   [[nodiscard]] std::unique_ptr<Cost> clone() const override { return std::make_unique<RunawayCost>(*this); }
-  void own_gradients(const Real* points, int stride, Real* gradient) const override {
+  void own_gradients(const Real* points, int stride, Real* gradient, const Real* /*held*/ = nullptr) const override {
     gradient[0] = std::exp(points[0]);
     gradient[1] = points[stride + 1];
   }
   [[nodiscard]] const SparseRows& hessian_pattern() const override { return pattern_; }
-  void hessian_rows(const Real* points, int /*stride*/, Real* values) const override {
+  void hessian_rows(const Real* points, int /*stride*/, Real* values, const Real* /*held*/ = nullptr) const override {
     values[0] = std::exp(points[0]);
     values[1] = 1.0;
   }
@@ -232,12 +233,12 @@ class ExponentialCost final : public GradientsOnly {
  public:
   ExponentialCost() : GradientsOnly(2) {}
   [[nodiscard]] std::unique_ptr<Cost> clone() const override { return std::make_unique<ExponentialCost>(*this); }
-  void own_gradients(const Real* points, int stride, Real* gradient) const override {
+  void own_gradients(const Real* points, int stride, Real* gradient, const Real* /*held*/ = nullptr) const override {
     gradient[0] = std::exp(points[0] - 1.0) - 1.0 + points[1];
     gradient[1] = std::sinh(points[stride + 1]) - points[stride];
   }
   [[nodiscard]] const SparseRows& hessian_pattern() const override { return pattern_; }
-  void hessian_rows(const Real* points, int stride, Real* values) const override {
+  void hessian_rows(const Real* points, int stride, Real* values, const Real* /*held*/ = nullptr) const override {
     values[0] = std::exp(points[0] - 1.0);
     values[1] = 1.0;
     values[2] = -1.0;
@@ -253,12 +254,12 @@ class CyclingCost final : public GradientsOnly {
  public:
   CyclingCost() : GradientsOnly(2) {}
   [[nodiscard]] std::unique_ptr<Cost> clone() const override { return std::make_unique<CyclingCost>(*this); }
-  void own_gradients(const Real* points, int stride, Real* gradient) const override {
+  void own_gradients(const Real* points, int stride, Real* gradient, const Real* /*held*/ = nullptr) const override {
     gradient[0] = points[0] * points[0] * points[0] - 2.0 * points[0] + 2.0;
     gradient[1] = points[stride + 1];
   }
   [[nodiscard]] const SparseRows& hessian_pattern() const override { return pattern_; }
-  void hessian_rows(const Real* points, int /*stride*/, Real* values) const override {
+  void hessian_rows(const Real* points, int /*stride*/, Real* values, const Real* /*held*/ = nullptr) const override {
     values[0] = 3.0 * points[0] * points[0] - 2.0;
     values[1] = 1.0;
   }

@@ -25,6 +25,7 @@ std::string text_of(const std::string& path) {
 
 const std::string paper_game = "modelDescription/games/five_vehicles.toml";
 const std::string busy_game = "tests/reference/games/small_weight_bound.toml";  // enters and leaves the sphere often
+const std::string switching_game = "tests/reference/games/switching.toml";
 
 /// A loop with its input and integrator.
 struct Simulation {
@@ -78,7 +79,7 @@ TEST(Integrator, ConvergesWhenUnperturbed) {
 }
 
 TEST(Integrator, DoesNotDependOnCommunicationPoints) {
-  for (const std::string& game : {paper_game, busy_game}) {
+  for (const std::string& game : {paper_game, busy_game, switching_game}) {
     std::vector<std::vector<Real>> ends;
     Statistics statistics;
     for (const int per_second : {64, 32, 8, 1}) {
@@ -95,7 +96,7 @@ TEST(Integrator, DoesNotDependOnCommunicationPoints) {
 
 TEST(Integrator, RestoresCheckpointsBitForBit) {
   const Tolerances tolerances{1e-6, 1e-8};
-  for (const std::string& game : {paper_game, busy_game}) {
+  for (const std::string& game : {paper_game, busy_game, switching_game}) {
     Simulation run(text_of(game));
     run.integrator.start(0.0, tolerances);
     std::vector<Checkpoint> checkpoints;

@@ -31,7 +31,7 @@ struct Linearized {
         signals(loop.shape()),
         jacobian(loop),
         layer(loop) {
-    loop.evaluate_seeking(state.data(), nullptr, signals);
+    loop.evaluate_seeking(state.data(), nullptr, modes, signals);
     jacobian.linearize(state.data(), loop.plants(state.data(), nullptr, signals), signals, modes);
   }
   [[nodiscard]] std::size_t place(int p) const {
@@ -59,7 +59,7 @@ struct Linearized {
   }
   [[nodiscard]] std::vector<Real> errors(const std::vector<Real>& at_state) const {
     Signals there(loop.shape());
-    loop.evaluate_errors(at_state.data(), nullptr, there);
+    loop.evaluate_errors(at_state.data(), nullptr, modes, there);
     return {there.error.begin(), there.error.end()};
   }
 
@@ -110,10 +110,10 @@ TEST(RobustLayer, TellsWhetherTheLinearizationHolds) {
         const Real delta = loop.game.delta[loop.player(p)];
         defect = std::max(defect, share * counted(missed, delta) * loop.heaviest(static_cast<int>(p), gamma, weight));
       }
-      loop.loop.evaluate_seeking(evaluated.data(), nullptr, loop.signals);
+      loop.loop.evaluate_seeking(evaluated.data(), nullptr, loop.modes, loop.signals);
       const auto holds = [&](Real tolerance) {
-        return loop.layer.linearization_holds(loop.jacobian, loop.signals, state.data(), nullptr, gamma, weight.data(),
-                                              tolerance);
+        return loop.layer.linearization_holds(loop.jacobian, loop.signals, loop.modes, state.data(), nullptr, gamma,
+                                              weight.data(), tolerance);
       };
       EXPECT_TRUE(holds(1.0001 * defect + 1e-13)) << size;
       if (defect < 1e-10) continue;
@@ -144,7 +144,7 @@ TEST(RobustLayer, TellsSoForAnyStepInAStiffLayer) {
   };
   for (Real from = -3.0; from <= 3.0; from += 0.125) {
     const std::vector<Real> start = with_error(from * layer);
-    loop.loop.evaluate_seeking(start.data(), nullptr, loop.signals);
+    loop.loop.evaluate_seeking(start.data(), nullptr, loop.modes, loop.signals);
     loop.jacobian.linearize(start.data(), loop.loop.plants(start.data(), nullptr, loop.signals), loop.signals,
                             loop.modes);
     for (Real to = -3.0; to <= 3.0; to += 0.125) {
@@ -152,7 +152,7 @@ TEST(RobustLayer, TellsSoForAnyStepInAStiffLayer) {
       const Real defect = defect_of(loop, gamma, loop.heaviest(0, gamma, weight), from * layer, to * layer);
       if (defect < 1e-8) continue;
       for (const Real part : {0.5, 0.9, 0.999, 1.001}) {
-        EXPECT_EQ(loop.layer.linearization_holds(loop.jacobian, loop.signals, state.data(), nullptr, gamma,
+        EXPECT_EQ(loop.layer.linearization_holds(loop.jacobian, loop.signals, loop.modes, state.data(), nullptr, gamma,
                                                  weight.data(), part * defect),
                   part > 1.0)
             << from << " " << to << " " << part;
@@ -174,9 +174,9 @@ TEST(RobustLayer, StopsInTheMiddleWhatACorrectionCarriedAcross) {
   const auto choose = [](int p, Real a, Real b, Real c, Real d) { return std::array{a, b, c, d}[at(p % 4)]; };
   const std::vector<Real> from = with_errors([&](int p) { return choose(p, -5.0, 4.0, 0.0, 0.1); });
   const std::vector<Real> to = with_errors([&](int p) { return choose(p, -2.0, -0.5, 5.0, -0.1); });
-  loop.loop.evaluate_seeking(from.data(), nullptr, loop.signals);
+  loop.loop.evaluate_seeking(from.data(), nullptr, loop.modes, loop.signals);
   std::vector<Real> stopped = to;
-  EXPECT_TRUE(loop.layer.stop_in_the_middle(loop.signals, nullptr, stopped.data()));
+  EXPECT_TRUE(loop.layer.stop_in_the_middle(loop.signals, loop.modes, nullptr, stopped.data()));
   const std::vector<Real> errors = loop.errors(stopped);
   std::vector<Real> expected = to;
   for (int p = 1; p < 12; p += 4) {
@@ -185,9 +185,9 @@ TEST(RobustLayer, StopsInTheMiddleWhatACorrectionCarriedAcross) {
   }
   EXPECT_EQ(stopped, expected);
   // nothing was carried across
-  loop.loop.evaluate_seeking(stopped.data(), nullptr, loop.signals);
+  loop.loop.evaluate_seeking(stopped.data(), nullptr, loop.modes, loop.signals);
   std::vector<Real> kept = to;
-  EXPECT_FALSE(loop.layer.stop_in_the_middle(loop.signals, nullptr, kept.data()));
+  EXPECT_FALSE(loop.layer.stop_in_the_middle(loop.signals, loop.modes, nullptr, kept.data()));
   EXPECT_EQ(kept, to);
 }
 
@@ -196,9 +196,9 @@ TEST(RobustLayer, IsNotThereWithoutTheRobustTerm) {
   std::vector<Real> state = loop.state;
   const std::vector<Real> weight(state.size(), 1.0);
   const std::vector<Real> far = loop.near(state, 1e3);
-  EXPECT_TRUE(
-      loop.layer.linearization_holds(loop.jacobian, loop.signals, far.data(), nullptr, 1.0, weight.data(), 0.0));
-  EXPECT_FALSE(loop.layer.stop_in_the_middle(loop.signals, nullptr, state.data()));
+  EXPECT_TRUE(loop.layer.linearization_holds(loop.jacobian, loop.signals, loop.modes, far.data(), nullptr, 1.0,
+                                             weight.data(), 0.0));
+  EXPECT_FALSE(loop.layer.stop_in_the_middle(loop.signals, loop.modes, nullptr, state.data()));
   EXPECT_EQ(state, loop.state);
 }
 

@@ -103,6 +103,9 @@ int main(int count, char** arguments) {
       "sin(x[i,l]) * x[mod(i, N) + 1, 1] - 0.5 * v[max(i, 2), l] * tanh(v[2,1] / 0.1)",
       "0.3 * cos(2 * t) + exp(-t) - R[1,2] * pi^-1.5e0",
       "if(i > 1 and not l == 2 or order[i] <= 1, log1p(hypot(x[i,1], 2)), atan2(x[1,1], 1)) / prod(k for k in 1..3)",
+      "if(x[1,1] > p and not x[2,1] <= 0.5, sqrt(x[1,1]), abs(x[3,2])) + sign(x[1,2]) * mod(x[2,2], 0.3)",
+      "min(floor(2 * x[1,1]), max(x[2,1], h[1])) + sum(x[j,1] for j in 1..N if x[j,1] >= 0)",
+      "square(t - 0.1, 2) + pulse(t, 1, 0.001) + noise(7 + i, 0.5) + if(mod(t, 2) < 0.5, floor(3 * t), 0)",
   };
   for (std::size_t k = 0; k < std::size(texts); ++k) write(folder / "expressions", std::to_string(k), texts[k]);
   return 0;

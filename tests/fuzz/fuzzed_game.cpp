@@ -26,8 +26,8 @@ static void count_message(fmi2ComponentEnvironment instance, fmi2String name, fm
 const std::vector<FuzzedGame>& fuzzed_games() {
   static const std::vector<FuzzedGame> games = [] {
     std::vector<FuzzedGame> read;
-    for (const char* name :
-         {"two_scalar_players", "vector_centers", "small_weight_bound", "five_vehicles", "interleaved_orders"}) {
+    for (const char* name : {"two_scalar_players", "vector_centers", "small_weight_bound", "five_vehicles",
+                             "interleaved_orders", "switching"}) {
       read.emplace_back(name);
     }
     return read;

@@ -34,7 +34,7 @@ class Metrics:
     control_energy: float  # integral of |u|^2 over the run
     control_peak: float  # largest |u_il|
     final_error: float  # largest |x - x*| from the settle time on
-    events: float  # weight columns that entered or left the sphere
+    events: float  # weight columns that entered or left the sphere, and conditions that changed
     band: float  # band of the settling time, in the unit of x
 
     def as_json(self) -> dict[str, float | None]:
