@@ -238,7 +238,7 @@ void ClosedLoop::event_functions(const Real* state, const Real* inputs, const Mo
     evaluate_errors(state, inputs, modes, signals);
     evaluate_network(state, signals);
   }
-  for (std::size_t p = 0; p < at(shape().actions()); ++p) {
+  for (std::size_t p = 0; p < at(shape().own_entries()); ++p) {
     const Real W_max = gains_.W_max[p];
     const Real height = values[p] / W_max - 1.0;
     const Real rate = 2.0 * gains_.beta[p] * signals.error[p] * signals.network[p] / W_max;  // of w'w / W_max, inside
