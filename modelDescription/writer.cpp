@@ -103,8 +103,9 @@ int main(int argc, char** argv) {
     std::cerr << usage;
     return wrong_usage;
   }
-  const std::string game = utf8(argv[optind]);
+  std::string game = argv[optind];
   try {
+    game = utf8(argv[optind]);
     std::string toml;
     try {
       toml = content_of(game);
