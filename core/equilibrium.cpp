@@ -2,6 +2,7 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <exception>
 #include <limits>
@@ -225,24 +226,29 @@ bool vanish(const std::vector<Real>& gradient, const SparseRows& pattern, const 
   return true;
 }
 
+OwnCurvature curvature_of(int i, const SparseRows& pattern, const std::vector<Real>& hessian, const Shape& shape) {
+  Eigen::MatrixXd own = Eigen::MatrixXd::Zero(shape.dimension, shape.dimension);
+  Real scale = 0.0;
+  for (int l = 0; l < shape.dimension; ++l) {
+    const auto row = at(shape.entry(i, l));
+    for (int k = pattern.start[row]; k < pattern.start[row + 1]; ++k) {
+      const int column = pattern.column[at(k)];
+      scale = std::max(scale, std::abs(hessian[at(k)]));
+      if (shape.player_of(column) == i) own(l, shape.coordinate_of(column)) += hessian[at(k)];
+    }
+  }
+  const Real smallest =
+      own.isDiagonal(0.0)
+          ? own.diagonal().minCoeff()
+          : Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(own, Eigen::EigenvaluesOnly).eigenvalues()(0);
+  return {smallest, scale};
+}
+
 /// Throws where a player could lower its cost: its own Hessian at x has an eigenvalue that is negative beyond rounding.
 void require_best_responses(const SparseRows& pattern, const std::vector<Real>& hessian, const Shape& shape) {
   constexpr Real rounding = 1e-12;  // of the largest second derivative of the player's cost
   for (int i = 0; i < shape.players; ++i) {
-    Eigen::MatrixXd own = Eigen::MatrixXd::Zero(shape.dimension, shape.dimension);
-    Real scale = 0.0;
-    for (int l = 0; l < shape.dimension; ++l) {
-      const auto row = at(shape.entry(i, l));
-      for (int k = pattern.start[row]; k < pattern.start[row + 1]; ++k) {
-        const int column = pattern.column[at(k)];
-        scale = std::max(scale, std::abs(hessian[at(k)]));
-        if (shape.player_of(column) == i) own(l, shape.coordinate_of(column)) += hessian[at(k)];
-      }
-    }
-    const Real smallest =
-        own.isDiagonal(0.0)
-            ? own.diagonal().minCoeff()
-            : Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(own, Eigen::EigenvaluesOnly).eigenvalues()(0);
+    const auto [smallest, scale] = curvature_of(i, pattern, hessian, shape);
     if (smallest >= -rounding * scale) continue;
     const std::string number = std::to_string(i + 1);
     throw GameError("player[" + number + "].cost is concave in the player's own action (second derivative " +
@@ -286,8 +292,21 @@ std::vector<Real> affine_equilibrium(const Cost& cost, std::size_t n) {
   return x;
 }
 
-/// Newton's method with steps that are halved until the gradients become smaller.
-std::vector<Real> search_from(const Cost& cost, std::vector<Real> x) {
+/// The first player whose cost or gradient is not finite at x, such as log(x) below 0, though its gradient 1/x is
+/// there; -1 if there is none.
+int player_without_cost(const Cost& cost, const Shape& shape, const std::vector<Real>& x,
+                        const std::vector<Real>& gradient) {
+  for (int i = 0; i < shape.players; ++i) {
+    if (!std::isfinite(cost.value(i, x.data()))) return i;
+    for (int l = 0; l < shape.dimension; ++l) {
+      if (!std::isfinite(gradient[at(shape.entry(i, l))])) return i;
+    }
+  }
+  return -1;
+}
+
+/// Newton's method with steps that are halved until the gradients become smaller, where all costs are defined.
+std::vector<Real> search_from(const Cost& cost, const Shape& shape, std::vector<Real> x) {
   constexpr Real enough = 1e-12;
   constexpr int most_halvings = 40;
   const SparseRows& pattern = cost.hessian_pattern();
@@ -296,7 +315,11 @@ std::vector<Real> search_from(const Cost& cost, std::vector<Real> x) {
   std::vector<Real> gradient(n);
   std::vector<Real> trial(n);
   cost.own_gradients(x.data(), 0, gradient.data());
-  if (!is_finite(gradient)) fail_to_converge();
+  if (const int i = player_without_cost(cost, shape, x, gradient); i >= 0) {
+    throw GameError("player[" + std::to_string(i + 1) +
+                    "].cost is not finite where the search for the Nash equilibrium begins, expected an" +
+                    " equilibrium.guess, or x0 without one, at which all costs and their gradients are");
+  }
   for (int iteration = 0; iteration < most_iterations; ++iteration) {
     cost.hessian_rows(x.data(), 0, hessian.data());
     std::vector<Real> step = gradient;
@@ -312,36 +335,79 @@ std::vector<Real> search_from(const Cost& cost, std::vector<Real> x) {
       if (halving == most_halvings) fail_to_converge();
       for (std::size_t p = 0; p < n; ++p) trial[p] = x[p] - share * step[p];
       cost.own_gradients(trial.data(), 0, gradient.data());
-      if (is_finite(gradient) && norm(gradient) <= (1.0 - 0.1 * share) * before) break;
+      if (is_finite(gradient) && norm(gradient) <= (1.0 - 0.1 * share) * before &&
+          player_without_cost(cost, shape, trial, gradient) < 0) {
+        break;
+      }
     }
     x = trial;
   }
   fail_to_converge();
 }
 
+constexpr std::array starts_everywhere{0.0, 1.0, -1.0, 0.1, 10.0};
+
+std::vector<Real> accepted(std::vector<Real> x, const Cost& cost, const Shape& shape) {
+  std::vector<Real> hessian(at(cost.hessian_pattern().entries()));
+  cost.hessian_rows(x.data(), 0, hessian.data());
+  require_best_responses(cost.hessian_pattern(), hessian, shape);
+  return x;
+}
+
 }  // namespace
 
 std::vector<Real> nash_equilibrium(const Cost& cost, const Shape& shape, const std::vector<Real>& guess) {
   const std::size_t n = at(shape.actions());
-  const auto accepted = [&](std::vector<Real> x) {
-    std::vector<Real> hessian(at(cost.hessian_pattern().entries()));
-    cost.hessian_rows(x.data(), 0, hessian.data());
-    require_best_responses(cost.hessian_pattern(), hessian, shape);
-    return x;
-  };
-  if (cost.is_affine()) return accepted(affine_equilibrium(cost, n));
+  if (cost.is_affine()) return accepted(affine_equilibrium(cost, n), cost, shape);
   std::exception_ptr first_failure;
   std::vector<std::vector<Real>> starts;
   if (!guess.empty()) starts.push_back(guess);
-  for (const Real everywhere : {0.0, 1.0, -1.0, 0.1, 10.0}) starts.emplace_back(n, everywhere);
+  for (const Real everywhere : starts_everywhere) starts.emplace_back(n, everywhere);
   for (const std::vector<Real>& start : starts) {
     try {
-      return accepted(search_from(cost, start));
+      return accepted(search_from(cost, shape, start), cost, shape);
     } catch (const GameError&) {
       if (!first_failure) first_failure = std::current_exception();
     }
   }
   std::rethrow_exception(first_failure);
+}
+
+std::vector<std::vector<Real>> other_equilibria(const Cost& cost, const Shape& shape, const std::vector<Real>& x_star) {
+  constexpr int patterns = 6;  // of signs
+  constexpr Real apart = 1e-6;
+  constexpr std::size_t large = 100;  // entries, from where a search takes long
+  std::vector<std::vector<Real>> starts;
+  for (const Real everywhere : starts_everywhere) starts.emplace_back(x_star.size(), everywhere);
+  for (const Real times : {-2.0, -1.0, 0.25, 3.0}) {
+    if (x_star.size() > large) break;
+    starts.push_back(x_star);
+    for (Real& action : starts.back()) action *= times;
+  }
+  for (int pattern = 0; pattern < patterns && x_star.size() <= large; ++pattern) {
+    starts.push_back(x_star);
+    for (std::size_t p = 0; p < x_star.size(); ++p) {
+      const bool is_plus = ((p >> static_cast<unsigned>(pattern / 2)) + static_cast<std::size_t>(pattern)) % 2 == 0;
+      starts.back()[p] += (is_plus ? 2.0 : -2.0) * (1.0 + std::abs(x_star[p]));
+    }
+  }
+  std::vector<std::vector<Real>> found;
+  const auto is_near = [](const std::vector<Real>& a, const std::vector<Real>& b) {
+    Real distance = 0.0;
+    for (std::size_t p = 0; p < a.size(); ++p) distance = std::max(distance, std::abs(a[p] - b[p]));
+    return distance <= apart * (1.0 + largest_magnitude(b));
+  };
+  for (const std::vector<Real>& start : starts) {
+    try {
+      const std::vector<Real> x = accepted(search_from(cost, shape, start), cost, shape);
+      const bool is_known = is_near(x, x_star) || std::any_of(found.begin(), found.end(),
+                                                              [&](const auto& other) { return is_near(x, other); });
+      if (!is_known) found.push_back(x);
+    } catch (const GameError&) {
+      continue;  // which leads nowhere
+    }
+  }
+  return found;
 }
 
 // P(x*) = 0 at every cost, so that (dP/dx) dx* = -dP, the change of P at a fixed x
@@ -359,8 +425,13 @@ std::vector<Real> nash_equilibrium_along(const Cost& cost, const Cost& direction
   return along;
 }
 
-Real strong_monotonicity(const Cost& cost, const Shape& shape) {
-  const std::vector<Real> x(at(shape.actions()), 0.0);
+OwnCurvature own_curvature(const Cost& cost, const Shape& shape, int i, const std::vector<Real>& x) {
+  std::vector<Real> hessian(at(cost.hessian_pattern().entries()));
+  cost.hessian_rows(x.data(), 0, hessian.data());
+  return curvature_of(i, cost.hessian_pattern(), hessian, shape);
+}
+
+Real strong_monotonicity(const Cost& cost, const std::vector<Real>& x) {
   const SparseRows& pattern = cost.hessian_pattern();
   std::vector<Real> hessian(at(pattern.entries()));
   cost.hessian_rows(x.data(), 0, hessian.data());

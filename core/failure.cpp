@@ -116,4 +116,19 @@ std::string unusable_rate(const ClosedLoop& loop, const Real* inputs, const Sign
   return "the rate of " + state_name(loop, static_cast<int>(found - rate)) + " is " + number_text(*found);
 }
 
+std::string unusable_start(const ClosedLoop& loop, const Real* inputs, const Signals& signals, const Real* rate) {
+  const Shape& shape = loop.shape();
+  for (int p = 0; p < shape.own_entries(); ++p) {
+    const Real value = signals.gradient[at(p)];
+    if (std::isfinite(value)) continue;
+    const std::string player = std::to_string(shape.player_of_own(p) + 1);
+    return "the gradient of the cost of player " + player + " is " + number_text(value) +
+           " at its first estimates, expected y0[" + player +
+           ",j,l] at which the cost is defined, and z0, which estimates of players of order 1 follow (both are 0 "
+           "where" +
+           " the game file does not give them)";
+  }
+  return unusable_rate(loop, inputs, signals, rate);
+}
+
 }  // namespace mixed_order_game

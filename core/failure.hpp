@@ -22,4 +22,8 @@ std::string unbounded_growth(const ClosedLoop& loop, const Real* state);
 /// is none of these, a rate; empty when none is.
 std::string unusable_rate(const ClosedLoop& loop, const Real* inputs, const Signals& signals, const Real* rate);
 
+/// The same of the rates at the start, where a gradient that is not finite means first estimates outside of what the
+/// cost is defined for.
+std::string unusable_start(const ClosedLoop& loop, const Real* inputs, const Signals& signals, const Real* rate);
+
 }  // namespace mixed_order_game

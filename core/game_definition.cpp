@@ -5,6 +5,7 @@
 #include "block_elimination.hpp"
 #include "definition/expression_reader.hpp"
 #include "equilibrium.hpp"
+#include "equilibrium_verdict.hpp"
 #include "errors.hpp"
 #include "families/expression_disturbance.hpp"
 #include "families/expression_dynamics.hpp"
@@ -480,6 +481,11 @@ Cloned<Interface> family_of(Coefficients coefficients, bool has_expressions, con
 }  // namespace
 
 Game parse_game(std::string_view toml) {
+  std::vector<ExpressionCost::Text> cost_expressions;
+  return parse_game(toml, cost_expressions);
+}
+
+Game parse_game(std::string_view toml, std::vector<ExpressionCost::Text>& costs) {
   const toml::table document = parse_toml(toml);
   const TomlEntry game(document);
   game.accept_keys({"title", "dimension", "expose", "strategy", "gains", "rbf", "graph", "parameters", "defaults",
@@ -503,7 +509,7 @@ Game parse_game(std::string_view toml) {
   QuadraticCost cost(shape);
   PolynomialDynamics dynamics(shape);
   SinusoidalDisturbance disturbance(shape);
-  std::vector<ExpressionCost::Text> costs;
+  costs.clear();
   const PlayerExpressions none(shape.own_entries(), shape.hosts(), n, static_cast<int>(named.values.size()));
   PlayerExpressions dynamics_values = none;
   PlayerExpressions disturbance_values = none;

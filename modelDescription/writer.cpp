@@ -10,6 +10,7 @@
 
 #include "errors.hpp"
 #include "game_check.hpp"
+#include "judgement.hpp"
 #include "model_description.hpp"
 #include "reference_results.hpp"
 #include "resource_location.hpp"
@@ -19,13 +20,14 @@ using namespace mixed_order_game;
 namespace {
 
 constexpr const char* usage =
-    "usage: mixed-order-game-description [[--output FILE] [--extra FOLDER] | --check] GAME.toml\n"
+    "usage: mixed-order-game-description [[--output FILE] [--extra FOLDER] | --check | --judge] GAME.toml\n"
     "\n"
     "Writes modelDescription.xml of a game to standard output.\n"
     "\n"
     "  -o, --output FILE   write to FILE, which is replaced only when all went well\n"
     "  -e, --extra FOLDER  write reference results below FOLDER, unless the run is long or fails\n"
     "  -c, --check         only check the game: what is wrong with it, and where, in JSON on standard output\n"
+    "  -j, --judge         write what is known of its Nash equilibrium, as JSON, to standard output\n"
     "  -h, --help          show this text\n"
     "\n"
     "Exit code: 0 fine, 1 the game is not valid or a file cannot be read or written, 2 wrong usage.\n";
@@ -72,15 +74,14 @@ Exit check(const std::string& toml) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  const option options[] = {{"output", required_argument, nullptr, 'o'},
-                            {"extra", required_argument, nullptr, 'e'},
-                            {"check", no_argument, nullptr, 'c'},
-                            {"help", no_argument, nullptr, 'h'},
-                            {}};
+  const option options[] = {{"output", required_argument, nullptr, 'o'}, {"extra", required_argument, nullptr, 'e'},
+                            {"check", no_argument, nullptr, 'c'},        {"judge", no_argument, nullptr, 'j'},
+                            {"help", no_argument, nullptr, 'h'},         {}};
   std::string output;
   std::string extra;
   bool check_only = false;
-  for (int option = 0; (option = getopt_long(argc, argv, "o:e:ch", options, nullptr)) != -1;) {
+  bool judge_only = false;
+  for (int option = 0; (option = getopt_long(argc, argv, "o:e:cjh", options, nullptr)) != -1;) {
     switch (option) {
       case 'o':
         output = optarg;
@@ -91,6 +92,9 @@ int main(int argc, char** argv) {
       case 'c':
         check_only = true;
         break;
+      case 'j':
+        judge_only = true;
+        break;
       case 'h':
         std::cout << usage;
         return fine;
@@ -99,7 +103,8 @@ int main(int argc, char** argv) {
         return wrong_usage;
     }
   }
-  if (optind + 1 != argc || (check_only && !(output.empty() && extra.empty()))) {
+  const int ways = int{check_only} + int{judge_only} + int{!output.empty() || !extra.empty()};
+  if (optind + 1 != argc || ways > 1) {
     std::cerr << usage;
     return wrong_usage;
   }
@@ -114,6 +119,11 @@ int main(int argc, char** argv) {
       return failure;
     }
     if (check_only) return check(toml);
+    if (judge_only) {
+      std::cout << judgement(toml) << std::flush;
+      if (!std::cout) throw Error("cannot write to standard output");
+      return fine;
+    }
     const Model model(toml);
     const std::string xml = model_description(model);
     if (!output.empty()) {

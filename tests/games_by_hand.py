@@ -193,7 +193,7 @@ def rivalling_pairs() -> Functions:
 
     def costs(x: Numbers) -> Numbers:
         here = own(x)
-        alone = np.sum(1.5 * np.log(np.cosh(here - p)) + 0.4 * (here - p) ** 2, axis=-1)
+        alone = np.sum(1.5 * np.cosh((here - p) / 2.0) + 0.4 * (here - p) ** 2, axis=-1)
         return np.asarray(alone + np.sum(S * np.sum(here[..., np.newaxis, :] * x, axis=-1), axis=-1))
 
     def dynamics(x: Numbers, v: Numbers) -> Numbers:

@@ -49,6 +49,8 @@ class Evaluation {
   /// Signals and rates that prepare_signals found.
   [[nodiscard]] const Signals& signals() const { return signals_; }
   [[nodiscard]] const AlignedVector& rate() const { return rate_; }
+  /// Inputs that act there.
+  [[nodiscard]] const Real* acting_inputs() const { return input_values_.data(); }
   [[nodiscard]] View view(const Settings& settings, const Standing& standing);
 
  private:

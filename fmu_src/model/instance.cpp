@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "block_elimination.hpp"
+#include "failure.hpp"
 
 namespace mixed_order_game {
 
@@ -99,7 +100,10 @@ void Instance::exit_initialization() {
   evaluation_.prepare_signals(standing());
   const AlignedVector& rate = evaluation_.rate();
   if (!std::all_of(rate.begin(), rate.end(), [](Real value) { return std::isfinite(value); })) {
-    throw Error("the initial rates are not finite: the parameters or initial values are too large");
+    const std::string reason =
+        unusable_start(evaluation_.loop(), evaluation_.acting_inputs(), evaluation_.signals(), rate.data());
+    throw Error("the initial rates are not finite: " +
+                (reason.empty() ? "the parameters or initial values are too large" : reason));
   }
   if (interface_ == Interface::model_exchange) {
     model_exchange_.emplace(evaluation_,

@@ -365,19 +365,20 @@ def test_what_decides_comes_first(observed: Observed) -> None:
 
 
 def test_no_equilibrium(fmu_of: FmuOf) -> None:
-    game = game_parameters(read_model(fmu_of("two_scalar_players")))
-    assert nash_equilibrium_exists(game).verdict is Verdict.HOLDS
+    fmu = fmu_of("two_scalar_players")
+    game = game_parameters(read_model(fmu))
+    assert nash_equilibrium_exists(game, fmu).verdict is Verdict.HOLDS
     concave = replace(game, cost_quadratic=np.array([1.0, -3.0]))
-    claim = nash_equilibrium_exists(concave)
+    claim = nash_equilibrium_exists(concave, fmu)
     assert claim.verdict is Verdict.FAILS
     assert "player 2 is concave" in claim.reason
     singular = replace(game, cost_quadratic=np.zeros(2), cost_coupling=np.array([[0.0, 1.0], [1.0, 0.0]]))
-    assert nash_equilibrium_exists(singular).verdict is Verdict.FAILS
+    assert nash_equilibrium_exists(singular, fmu).verdict is Verdict.FAILS
     # f_1 = -2 x_1 x_2 + ..., f_2 = 2 x_1 x_2 + ...: no curvature of their own, gradients zero at 0 alone
     flat = replace(
         game, cost_quadratic=np.array([-1.0, 1.0]), cost_coupling=np.array([[0.0, 1.0], [-1.0, 0.0]])
     )
-    assert nash_equilibrium_exists(flat).verdict is Verdict.HOLDS
+    assert nash_equilibrium_exists(flat, fmu).verdict is Verdict.HOLDS
 
 
 def test_bound_of_the_seeking_error_solves_its_equation() -> None:

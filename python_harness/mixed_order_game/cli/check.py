@@ -16,6 +16,7 @@ def check(
     from ..errors import GameError
     from ..extras import has, install
     from ..game.check import check_game
+    from ..game.equilibrium import Kind, judge_equilibrium
 
     broken = False
     for game in games:
@@ -28,7 +29,11 @@ def check(
         for problem in problems:
             typer.echo(f"{game}:{problem.line}:{problem.column}: {problem.sentence}", err=True)
         if not problems:
-            typer.echo(f"{game} is valid")
+            equilibrium = judge_equilibrium(game)
+            local = f"; {equilibrium.sentence.removesuffix('.')}" if equilibrium.kind is Kind.LOCAL else ""
+            typer.echo(f"{game} is valid{local}")
+            for warning in equilibrium.warnings:
+                typer.echo(f"{game}: warning: {warning}", err=True)
         broken = broken or bool(problems)
     if broken:
         if not has("jsonschema"):

@@ -15,6 +15,7 @@ from ..errors import ResultError
 from ..fmu.model import Model, sources
 from ..fmu.parts import longest_sampled_step
 from ..game.definition import PARTS, NamedParameter, named_parameters
+from ..game.equilibrium import judge_equilibrium
 from ..results.result import Result
 from ..studies.validate import Validation, Verdict
 from .printing import show, standard_output
@@ -37,6 +38,8 @@ def print_info(model: Model, *, variables: bool = False) -> None:
     for name, told in _particulars(model):
         grid.add_row(name, told)
     grid.add_row("experiment", f"{model.stop_time:g} s, step {model.step:g} s, tolerance {model.tolerance:g}")
+    found = data["equilibrium"]
+    grid.add_row("equilibrium", Text(" ".join(dict.fromkeys([found["sentence"], *found["warnings"]]))))
     counts = ", ".join(f"{count} {kind}" for kind, count in data["variable_counts"].items())
     grid.add_row("variables", counts)
     show(grid, console)
@@ -105,6 +108,7 @@ def info_data(model: Model, *, variables: bool = False) -> dict[str, Any]:
         "gains": model.gains,
         "named_parameters": [asdict(each) for each in named_parameters(model.game)],
         "expressions": {part: list(numbers) for part, numbers in model.expressions.items()},
+        "equilibrium": judge_equilibrium(model.path).as_json(),
         "stop_time": model.stop_time,
         "step": model.step,
         "tolerance": model.tolerance,

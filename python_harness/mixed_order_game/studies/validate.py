@@ -126,7 +126,7 @@ def validate(
         game = game_parameters(model)
         if has_expressions(game.expressions, "cost"):
             game = replace(game, x_star=_equilibrium_of(simulator))
-        equilibrium = nash_equilibrium_exists(game)
+        equilibrium = nash_equilibrium_exists(game, model.path)
         if equilibrium.verdict is Verdict.FAILS:
             claims = [
                 equilibrium,

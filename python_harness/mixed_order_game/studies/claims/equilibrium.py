@@ -1,9 +1,12 @@
 """The claim that there is a Nash equilibrium for the actions to converge to."""
 
+from pathlib import Path
+
 import numpy as np
 
 from ...errors import GameError
 from ...game.definition import has_expressions
+from ...game.equilibrium import Equilibrium, Kind, judge_equilibrium
 from ...game.parameters import GameParameters
 from ...theory.spectrum import monotonicity_constant, nash_equilibrium
 from .verdict import Claim, Verdict
@@ -12,23 +15,26 @@ FLAT = 1e-12
 """Curvatures of this part of their terms are zero to rounding."""
 
 
-def nash_equilibrium_exists(game: GameParameters) -> Claim:
+def nash_equilibrium_exists(game: GameParameters, fmu: Path) -> Claim:
     """Gradients vanish at one point and no player's own cost is concave there.
 
-    An FMU whose costs have expressions cannot be instantiated unless it found such a point.
+    An FMU whose costs have expressions cannot be instantiated unless it found such a point; what is known of
+    it is judged by the game in the FMU.
     """
-    expression = has_expressions(game.expressions, "cost")
-    if expression:
-        return Claim(
-            "nash_equilibrium",
-            "All gradients vanish at x*, and no cost is concave there in its player's own action",
-            Verdict.HOLDS,
-            f"The FMU's search found x*. As {expression}, it is not proved that x* is the only equilibrium, "
-            "or more than a local one.",
-        )
+    if has_expressions(game.expressions, "cost"):
+        return _of_expressions(judge_equilibrium(fmu))
     verdict, reason = _judge(game)
     figures = {"m": monotonicity_constant(game)}
     return Claim("nash_equilibrium", "There is a unique Nash equilibrium x*", verdict, reason, figures)
+
+
+def _of_expressions(found: Equilibrium) -> Claim:
+    figures = {"m": found.monotonicity, "convex_within": float(found.convex_within.min())}
+    verdict = Verdict.NOT_SETTLED if found.kind is Kind.OPEN else Verdict.HOLDS
+    warnings = [each for each in found.warnings if each != found.sentence]
+    told = [found.sentence, *(warnings or ["That it is the only one is not proved."])]
+    statement = "x* is a Nash equilibrium, if only a local one"
+    return Claim("nash_equilibrium", statement, verdict, " ".join(told), figures)
 
 
 def _judge(game: GameParameters) -> tuple[Verdict, str]:

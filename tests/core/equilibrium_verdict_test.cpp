@@ -1,0 +1,151 @@
+#include "equilibrium_verdict.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+#include "errors.hpp"
+#include "game.hpp"
+#include "hessian_bounds.hpp"
+
+namespace mixed_order_game {
+namespace {
+
+using Kind = EquilibriumVerdict::Kind;
+constexpr Real everywhere = std::numeric_limits<Real>::infinity();
+
+std::string game(const std::string& cost, int dimension = 1, const std::string& more = "") {
+  return "title = \"Two players\"\ndimension = " + std::to_string(dimension) +
+         "\n[gains]\nk1 = 1.0\nk2 = 1.0\nk3 = 1.0\nk4 = 1.0\nbeta = 1.0\ndelta = 1.0\nepsilon = 1.0\n"
+         "[rbf]\ncenters = [0.0]\nwidth = 1.0\nW_max = 1.0\n[graph]\nedges = [[1, 2]]\n" +
+         more + "[defaults]\norder = 1\nx0 = 1.0\ncost = { expression = \"" + cost +
+         "\" }\n[[player]]\nname = \"a\"\n[[player]]\nname = \"b\"\n";
+}
+
+EquilibriumVerdict verdict_of(const std::string& toml) {
+  std::vector<ExpressionCost::Text> expressions;
+  const Game read = parse_game(toml, expressions);
+  return judge_equilibrium(read.parameters, expressions);
+}
+
+TEST(Verdict, IsNashWhereOwnCostsAreConvexEverywhere) {
+  for (const char* cost : {
+           "(x[i] - i)^2 + 0.1 * x[1] * x[2]",
+           "cosh(x[i] - i) + 0.1 * x[1] * x[2]",
+           "exp(x[i]) - x[i] + 0.1 * sin(x[mod(i, N) + 1])",
+           "(x[i] - 1)^4 + x[i]^2",
+           "0.2 * x[i] - log(1 + x[i]) + 0.1 * x[1] * x[2]",  // where it is defined: above -1
+           "x[i] - 2 * log(1 + 3 * x[i] / (1 + exp(x[mod(i, N) + 1])))",
+           "x[i]^2 + sin(x[i])",
+       }) {
+    const EquilibriumVerdict verdict = verdict_of(game(cost));
+    EXPECT_EQ(verdict.kind, Kind::nash) << cost;
+    for (const auto& player : verdict.players) EXPECT_EQ(player.convex_within, everywhere) << cost;
+    EXPECT_TRUE(verdict.others.empty()) << cost;
+  }
+}
+
+TEST(Verdict, IsLocalWhereTheyAreNot) {
+  struct Case {
+    const char* cost;
+    Real convex_within;  // at most: where the second derivative by hand is zero, or the domain falls apart
+  };
+  for (const auto& [cost, convex_within] : {
+           Case{"-exp(-(x[i] - 1)^2) + 0.01 * x[1] * x[2]", std::sqrt(0.5) + 0.1},
+           Case{"x[i] + 1 / x[i]", 1.0},  // below 0 costs are negative
+           Case{"cos(x[i]) + 0.1 * x[i]", 1.7},
+           Case{"-1 / (0.1 + (x[i] - 1)^2)", 0.2},
+           Case{"(x[i]^2 - 1)^2", 1.0},
+       }) {
+    const EquilibriumVerdict verdict = verdict_of(game(cost));
+    EXPECT_EQ(verdict.kind, Kind::local_nash) << cost;
+    for (const auto& player : verdict.players) {
+      EXPECT_GT(player.convex_within, 0.01) << cost;
+      EXPECT_LE(player.convex_within, convex_within) << cost;
+    }
+  }
+}
+
+TEST(Verdict, IsOpenWithoutASecondOrderProof) {
+  // x* = 0, where the second derivative is zero; one is a minimum along the own action, the other none
+  const std::string guess = "[equilibrium]\nguess = [0.0, 0.0]\n";
+  const EquilibriumVerdict verdict =
+      verdict_of(game("x[i]^4 * (1 + 0.5 * sin(5 * x[i])) + x[i] * x[mod(i, N) + 1]", 1, guess));
+  EXPECT_EQ(verdict.kind, Kind::open);
+  EXPECT_EQ(verdict.players[0].curvature, 0.0);
+  EXPECT_EQ(verdict.players[0].convex_within, 0.0);
+}
+
+TEST(Verdict, CountsEquilibria) {
+  const EquilibriumVerdict verdict = verdict_of(game("(x[i]^2 - 1)^2"));
+  ASSERT_FALSE(verdict.others.empty());
+  for (const auto& other : verdict.others) {
+    for (const Real x : other) EXPECT_NEAR(std::abs(x), 1.0, 1e-9);
+  }
+  EXPECT_GT(verdict.monotonicity, 0.0);
+  EXPECT_FALSE(verdict.is_affine);
+}
+
+TEST(Verdict, TakesTheMonotonicityAtTheEquilibrium) {
+  // P' = [[2, 3], [1, 2]]: symmetric part [[2, 2], [2, 2]], eigenvalues 0 and 4
+  const EquilibriumVerdict verdict = verdict_of(game("x[i]^2 + (4 - 2 * i + 1) * x[1] * x[2]"));
+  EXPECT_NEAR(verdict.monotonicity, 0.0, 1e-12);
+}
+
+TEST(Verdict, NamesWhatIsNotDefinedWhereTheSearchBegins) {
+  const std::string guess = "[equilibrium]\nguess = [21.0, 1.0]\n";
+  const auto refused = [](const std::string& toml) {
+    try {
+      parse_game(toml);
+    } catch (const GameError& error) {
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  EXPECT_NE(refused(game("x[i] - log(x[i] - 20)", 1, guess)).find("player[2].cost is not finite"), std::string::npos);
+}
+
+TEST(HessianBounds, ProveConvexityOfSeveralCoordinates) {
+  std::vector<ExpressionCost::Text> expressions;
+  const Game read =
+      parse_game(game("cosh(x[i,1] + x[i,2]) + x[i,1]^2 + x[i,2]^2 + 0.1 * x[i,1] * x[i,2]", 2), expressions);
+  const HessianBounds bounds(read.parameters, expressions);
+  const std::vector<Real> x(4, 0.0);
+  EXPECT_TRUE(bounds.is_convex(0, x, 1.0));
+  const Game saddle =
+      parse_game(game("x[i,1]^2 + x[i,2]^2 + 1.9 * x[i,1] * x[i,2] + 0.05 * cos(x[i,1])", 2), expressions);
+  EXPECT_TRUE(HessianBounds(saddle.parameters, expressions).is_convex(0, x, 1.0));
+  const Game above =
+      parse_game(game("x[i,1]^2 + x[i,2]^2 + 1.9 * x[i,1] * x[i,2] + 0.3 * cos(x[i,1] - 3)", 2), expressions);
+  EXPECT_FALSE(HessianBounds(above.parameters, expressions).is_convex(0, x, 10.0));
+}
+
+TEST(HessianBounds, EncloseTheHessian) {
+  std::vector<ExpressionCost::Text> expressions;
+  const Game read = parse_game(
+      game("x[i,1]^2 + x[i,2]^2 + exp(0.3 * x[1,1] * x[2,2]) + sin(x[i,1] * x[i,2]) + 0.2 * x[1,1]^3", 2), expressions);
+  const Shape& shape = read.parameters.shape;
+  const HessianBounds bounds(read.parameters, expressions);
+  const std::vector<Interval> box(4, {-1.0, 1.0});
+  std::vector<Interval> rows;
+  const SparseRows& pattern = read.parameters.cost->hessian_pattern();
+  std::vector<Real> hessian(at(pattern.entries()));
+  for (int sample = 0; sample < 200; ++sample) {
+    std::vector<Real> x(4);
+    for (std::size_t p = 0; p < 4; ++p) x[p] = std::sin(1.0 + 7.0 * sample + 3.0 * static_cast<Real>(p));
+    read.parameters.cost->hessian_rows(x.data(), 0, hessian.data());
+    for (int i = 0; i < 2; ++i) {
+      ASSERT_EQ(bounds.rows(i, box, rows), Enclosure::Definition::everywhere);
+      for (int l = 0; l < 2; ++l) {
+        const auto row = at(shape.entry(i, l));
+        for (int k = pattern.start[row]; k < pattern.start[row + 1]; ++k) {
+          EXPECT_TRUE(rows[at(l) * 4 + at(pattern.column[at(k)])].contains(hessian[at(k)]));
+        }
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace mixed_order_game

@@ -1,0 +1,80 @@
+#include "expression/interval.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+#include "expression/graph.hpp"
+#include "random_game.hpp"
+
+namespace mixed_order_game {
+namespace {
+
+constexpr Real infinite = std::numeric_limits<Real>::infinity();
+
+TEST(Intervals, EncloseWhatOperationsGiveAtTheirPoints) {
+  testing::RandomNumbers random(3);
+  std::vector<Real> numbers(6);
+  int compared = 0;
+  for (int k = static_cast<int>(Operation::add); k <= static_cast<int>(Operation::hypot); ++k) {
+    const auto operation = static_cast<Operation>(k);
+    for (int repeat = 0; repeat < 4000; ++repeat) {
+      random.fill(numbers, -3.0, 3.0);
+      if (repeat % 2 == 0) numbers[2] *= 0.01;  // narrow ones
+      Interval a{numbers[0], numbers[0] + std::abs(numbers[2])};
+      Interval b{numbers[1], numbers[1] + std::abs(numbers[3])};
+      if (repeat % 5 == 0) a.lower = std::round(a.lower);
+      if (repeat % 5 == 1) b = Interval::of(std::round(b.lower));  // integer exponents
+      if (repeat % 7 == 0) a.upper = 1000.0 * (1.0 + std::abs(a.upper));
+      a.upper = std::max(a.lower, a.upper);
+      const Real share_a = repeat % 3 == 0 ? 0.0 : 0.5 + numbers[4] / 6.0;
+      const Real share_b = repeat % 4 == 0 ? 1.0 : 0.5 + numbers[5] / 6.0;
+      const Real at_a = std::clamp(a.lower + share_a * (a.upper - a.lower), a.lower, a.upper);
+      const Real at_b = std::clamp(b.lower + share_b * (b.upper - b.lower), b.lower, b.upper);
+      const Real value = apply(operation, at_a, at_b);
+      if (!std::isfinite(value)) continue;
+      ++compared;
+      const Interval enclosed = enclose(operation, a, b);
+      EXPECT_TRUE(enclosed.contains(value)) << "operation " << k << " of " << at_a << ", " << at_b << " is " << value
+                                            << ", not in " << enclosed.lower << " to " << enclosed.upper << "; a "
+                                            << a.lower << " to " << a.upper << ", b " << b.lower << " to " << b.upper;
+      const Interval point = enclose(operation, Interval::of(at_a), Interval::of(at_b));
+      // 0 by definition, whatever is near, and where the angle jumps
+      if (at_a == 0.0 && (operation == Operation::power_log || operation == Operation::atan2)) continue;
+      EXPECT_LE(point.upper - point.lower, 1e-12 * (1.0 + std::abs(value))) << "operation " << k << " of " << at_a;
+    }
+  }
+  EXPECT_GT(compared, 60000);
+}
+
+TEST(Intervals, KeepWhatIsExact) {
+  const Interval sum = enclose(Operation::add, Interval::of(0.5), {0.25, 1.0});
+  EXPECT_EQ(sum.lower, 0.75);
+  EXPECT_EQ(sum.upper, 1.5);
+  const Interval slope = enclose(Operation::subtract, Interval::of(1.0), square(enclose(Operation::tanh, {}, {})));
+  EXPECT_EQ(slope.lower, 0.0);
+  EXPECT_EQ(slope.upper, 1.0);
+  // 0.1 + 0.2 rounds up to 0.30000000000000004
+  const Interval rounded = enclose(Operation::add, Interval::of(0.1), Interval::of(0.2));
+  EXPECT_LT(rounded.lower, rounded.upper);
+  EXPECT_TRUE(rounded.contains(0.1 + 0.2));
+}
+
+TEST(Intervals, ReachToInfinity) {
+  const Interval half{0.0, infinite};
+  EXPECT_EQ(enclose(Operation::exp, {}, {}).lower, 0.0);
+  EXPECT_EQ(enclose(Operation::exp, {}, {}).upper, infinite);
+  EXPECT_EQ(enclose(Operation::multiply, half, half).lower, 0.0);
+  EXPECT_EQ(enclose(Operation::divide, Interval::of(1.0), half).lower, 0.0);
+  EXPECT_EQ(enclose(Operation::divide, {1.0, infinite}, {1.0, infinite}).lower, 0.0);
+  EXPECT_EQ(enclose(Operation::divide, {1.0, infinite}, {1.0, infinite}).upper, infinite);
+  EXPECT_EQ(enclose(Operation::sin, half, {}).upper, 1.0);
+  EXPECT_TRUE(enclose(Operation::log, {-2.0, -1.0}, {}).is_empty());
+  const Interval largest = enclose(Operation::exp, {700.0, 1000.0}, {});
+  EXPECT_TRUE(std::isfinite(largest.lower));
+  EXPECT_EQ(largest.upper, infinite);
+}
+
+}  // namespace
+}  // namespace mixed_order_game
