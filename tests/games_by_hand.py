@@ -10,7 +10,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-from scipy.special import erf
+from scipy.special import erf, ndtri
 
 from tests.oracle.general_loop import Functions, own
 from tests.oracle.paper_equations import Numbers
@@ -234,6 +234,35 @@ def underwater_vehicles() -> Functions:
     return Functions(costs, dynamics, disturbances)
 
 
+def normal(seed: int, k: int) -> float:
+    """Number k of the sequence behind noise(seed, hold): NumPy advances the counter before the first word."""
+    word = int(np.random.Philox(counter=(k - 1) % 2**256, key=seed).random_raw(1)[0])
+    return float(ndtri(((word >> 12) + 0.5) / 2.0**52))
+
+
+def switching_cooling() -> Functions:
+    h, s = np.array([5.0, 5.5, 6.0, 6.5, 7.0]), np.array([1.2, 1.4, 1.6, 1.8, 2.0])
+
+    def costs(x: Numbers) -> Numbers:
+        load = own(x)[..., 0]
+        return np.asarray((load - h) ** 2 + (0.4 * x[..., 0].sum(axis=-1) + 5.0) * load)
+
+    def dynamics(x: Numbers, v: Numbers) -> Numbers:
+        g = 0.2 * x * np.cos(x)
+        g[2] = 0.2 * x[2] - 0.4 * v[2]
+        g[3] = 0.3 * np.sin(x[1]) - 0.4 * v[3]
+        return np.asarray(g)
+
+    def disturbances(t: float) -> Numbers:
+        halves = [np.floor((t + 0.3 * i) / ((2.0 + 0.5 * i) / 2.0)) for i in range(1, 6)]
+        square = np.array([1.0 if half % 2 == 0 else -1.0 for half in halves])
+        noise = np.array([normal(i, int(np.floor(t / 0.4))) for i in range(1, 6)])
+        return np.asarray(s * square + 0.4 * noise)[:, np.newaxis]
+
+    switches = [k * (1.0 + 0.25 * i) - 0.3 * i for i in range(1, 6) for k in range(1, 4)]
+    return Functions(costs, dynamics, disturbances, (*switches, 0.4, 0.8, 1.2))
+
+
 def two_hundred_households() -> Functions:
     """Wishes and weights are numbers that were drawn: those of the file."""
     given = tomllib.loads((GAMES / "two_hundred_households.toml").read_text(encoding="utf-8"))["parameters"]
@@ -265,6 +294,7 @@ BY_HAND: dict[str, Callable[[], Functions]] = {
         source_seeking,
         rivalling_pairs,
         underwater_vehicles,
+        switching_cooling,
         two_hundred_households,
     )
 }

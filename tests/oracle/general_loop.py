@@ -32,6 +32,8 @@ class Functions:
     """g_i, of x and v (N, D); (N, D)"""
     disturbances: Callable[[float], Numbers]
     """d_i, of t in s; (N, D)"""
+    jumps: Sequence[float] = ()
+    """the times in s at which the disturbances jump"""
 
 
 def own(x: Numbers) -> Numbers:
@@ -129,21 +131,28 @@ class GeneralLoop:
             ]
         )
 
-    def solve(
-        self, times: FloatArray, breaks: Sequence[float] = (), rtol: float = 1e-9, atol: float = 1e-10
-    ) -> FloatArray:
-        """States (T, n) at times (T,) in s from 0 on; the integration stops and goes on at breaks.
+    def solve(self, times: FloatArray, rtol: float = 1e-9, atol: float = 1e-10) -> FloatArray:
+        """States (T, n) at times (T,) in s from 0 on; the integration begins anew where disturbances jump.
 
         Raises ArithmeticError if the integrator gives up, or a weight column reaches its bound, which is not
         served.
         """
         states = [self.initial_state()[np.newaxis]]
-        ends = [each for each in sorted(breaks) if 0.0 < each < times[-1]] + [float(times[-1])]
+        ends = [each for each in sorted({*self.functions.jumps}) if 0.0 < each < times[-1]] + [
+            float(times[-1])
+        ]
         start, state = 0.0, states[0][0]
         for end in ends:
             within = times[(times > start) & (times <= end)]
+            before = float(np.nextafter(end, start))  # where disturbances have not jumped yet
             found = solve_ivp(
-                self.rate, (start, end), state, "DOP853", np.union1d(within, [end]), rtol=rtol, atol=atol
+                lambda t, state, last=before: self.rate(min(t, last), state),
+                (start, end),
+                state,
+                "DOP853",
+                np.union1d(within, [end]),
+                rtol=rtol,
+                atol=atol,
             )
             if not found.success:
                 raise ArithmeticError(found.message)

@@ -45,7 +45,8 @@ name = "b"
 # where every own cost is proved convex everywhere; elsewhere the largest distance within which it can be
 EVERYWHERE = {
     "cournot_two_markets", "energy_consumption", "energy_peak_price", "five_vehicles", "mobile_sensors",
-    "opinion_formation", "power_control", "rivalling_pairs", "underwater_vehicles",
+    "opinion_formation", "power_control", "rivalling_pairs", "switching_cooling",
+    "underwater_vehicles",
 }  # fmt: skip
 AT_MOST = {
     "source_seeking": 2.5,  # r, beyond which the field curves downwards
