@@ -71,14 +71,12 @@ class LoopEquations {
   void evaluate_gradient(const CoefficientsAs<Dependencies>& of, const Dependencies* y, const Modes&) {
     parameters_.cost->own_gradients(of, y, parameters_.shape.actions(), gradient.data());
   }
-  void evaluate_drift(const LoopNumbers<Dual>& number, const Dual& t, const Dual* x, const Dual* v,
-                      const Modes& modes) {
-    parameters_.dynamics->values(*number.dynamics, x, v, dynamics.data(), held(1, modes));
+  void evaluate_drift(const LoopNumbers<Dual>& number, const Dual& t, const Modes& modes) {
+    parameters_.dynamics->values(*number.dynamics, x.data(), reference.data(), dynamics.data(), held(1, modes));
     parameters_.disturbance->values(*number.disturbance, t, disturbance.data(), held(2, modes));
   }
-  void evaluate_drift(const LoopNumbers<Dependencies>& number, const Dependencies& t, const Dependencies* x,
-                      const Dependencies* v, const Modes&) {
-    parameters_.dynamics->values(*number.dynamics, x, v, dynamics.data());
+  void evaluate_drift(const LoopNumbers<Dependencies>& number, const Dependencies& t, const Modes&) {
+    parameters_.dynamics->values(*number.dynamics, x.data(), reference.data(), dynamics.data());
     parameters_.disturbance->values(*number.disturbance, t, disturbance.data());
   }
   const Real* held(int family, const Modes& modes) const { return modes.data() + parameters_.first_switch(family); }
@@ -141,7 +139,7 @@ void LoopEquations<Scalar>::evaluate_rates(const LoopNumbers<Scalar>& number, co
   const Shape& shape = parameters_.shape;
   const GainsAs<Scalar>& gains = number.gains;
   const int n = shape.actions();
-  evaluate_drift(number, t, x.data(), reference.data(), modes);
+  evaluate_drift(number, t, modes);
   for (int p = 0; p < shape.own_entries(); ++p) {
     const int i = shape.player_of_own(p);
     const bool second = shape.is_second_order(i);
