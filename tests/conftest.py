@@ -15,6 +15,10 @@ if signal.getsignal(signal.SIGHUP) == signal.SIG_IGN:
     signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 GAMES = Path(__file__).parent / "reference" / "games"
+COEFFICIENT_GAMES = [
+    path for path in sorted(GAMES.glob("*.toml")) if "expression" not in path.read_text(encoding="utf-8")
+]
+"""What the oracle reads."""
 
 FmuOf = Callable[[str], Path]
 

@@ -16,13 +16,13 @@ from mixed_order_game.theory.constants import (
 from mixed_order_game.theory.game import AnalysedGame, game_from_tables, read_game, toml_text, without_square
 from mixed_order_game.theory.graph import consensus_blocks, is_connected
 from mixed_order_game.theory.lyapunov import identity_right_side, scaled_identity
-from tests.conftest import GAMES, FmuOf
+from tests.conftest import COEFFICIENT_GAMES, GAMES, FmuOf
 from tests.oracle import equilibrium, linear_loop
 from tests.oracle import game as oracle
 from tests.oracle import paper_equations as paper
 
 FIVE_VEHICLES = Path(__file__).resolve().parents[2] / "modelDescription/games/five_vehicles.toml"
-PATHS = [FIVE_VEHICLES, *sorted(GAMES.glob("*.toml"))]
+PATHS = [FIVE_VEHICLES, *COEFFICIENT_GAMES]
 
 FloatArray = NDArray[np.float64]
 

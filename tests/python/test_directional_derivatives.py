@@ -13,13 +13,13 @@ import pytest
 from fmpy.fmi2 import FMU2Slave
 from numpy.typing import NDArray
 
-from tests.conftest import GAMES, FmuOf
+from tests.conftest import COEFFICIENT_GAMES, GAMES, FmuOf
 from tests.oracle import closed_loop
 from tests.oracle import paper_equations as paper
 from tests.oracle.equilibrium import nash_equilibrium
 from tests.oracle.game import FloatArray, Game, read_game
 
-NAMES = ["five_vehicles", *sorted(path.stem for path in GAMES.glob("*.toml"))]
+NAMES = ["five_vehicles", *(path.stem for path in COEFFICIENT_GAMES)]
 START = 0.3
 STOPS = (0.31, 0.8)
 TOLERANCE = 1e-9  # of an unknown's largest derivative, at least of 1

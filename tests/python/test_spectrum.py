@@ -10,11 +10,11 @@ from mixed_order_game import GameError, read_model
 from mixed_order_game.game.parameters import game_parameters
 from mixed_order_game.theory import spectrum
 from mixed_order_game.theory.game import read_game as read_game_file
-from tests.conftest import GAMES, FmuOf
+from tests.conftest import COEFFICIENT_GAMES, GAMES, FmuOf
 from tests.oracle import equilibrium, linear_loop
 from tests.oracle.game import Game, read_game
 
-NAMES = ["five_vehicles", *sorted(path.stem for path in GAMES.glob("*.toml"))]
+NAMES = ["five_vehicles", *(path.stem for path in COEFFICIENT_GAMES)]
 FIVE_VEHICLES = Path(__file__).resolve().parents[2] / "modelDescription/games/five_vehicles.toml"
 
 

@@ -30,6 +30,9 @@ def check(
             typer.echo(f"{game}:{problem.line}:{problem.column}: {problem.sentence}", err=True)
         if not problems:
             equilibrium = judge_equilibrium(game)
+            if equilibrium is None:
+                typer.echo(f"{game} is valid")
+                continue
             local = f"; {equilibrium.sentence.removesuffix('.')}" if equilibrium.kind is Kind.LOCAL else ""
             typer.echo(f"{game} is valid{local}")
             for warning in equilibrium.warnings:

@@ -38,8 +38,8 @@ def print_info(model: Model, *, variables: bool = False) -> None:
     for name, told in _particulars(model):
         grid.add_row(name, told)
     grid.add_row("experiment", f"{model.stop_time:g} s, step {model.step:g} s, tolerance {model.tolerance:g}")
-    found = data["equilibrium"]
-    grid.add_row("equilibrium", Text(" ".join(dict.fromkeys([found["sentence"], *found["warnings"]]))))
+    if found := data["equilibrium"]:
+        grid.add_row("equilibrium", Text(" ".join(dict.fromkeys([found["sentence"], *found["warnings"]]))))
     counts = ", ".join(f"{count} {kind}" for kind, count in data["variable_counts"].items())
     grid.add_row("variables", counts)
     show(grid, console)
@@ -93,6 +93,7 @@ def _particulars(model: Model) -> Iterator[tuple[str, str]]:
 
 def info_data(model: Model, *, variables: bool = False) -> dict[str, Any]:
     """The same as plain values for json.dumps."""
+    equilibrium = judge_equilibrium(model.path)
     data: dict[str, Any] = {
         "title": model.title,
         "fmu": str(model.path),
@@ -108,7 +109,7 @@ def info_data(model: Model, *, variables: bool = False) -> dict[str, Any]:
         "gains": model.gains,
         "named_parameters": [asdict(each) for each in named_parameters(model.game)],
         "expressions": {part: list(numbers) for part, numbers in model.expressions.items()},
-        "equilibrium": judge_equilibrium(model.path).as_json(),
+        "equilibrium": equilibrium.as_json() if equilibrium else None,
         "stop_time": model.stop_time,
         "step": model.step,
         "tolerance": model.tolerance,

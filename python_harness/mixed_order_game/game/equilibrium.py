@@ -107,8 +107,10 @@ class Equilibrium:
         }
 
 
-def judge_equilibrium(game: Path | str | None) -> Equilibrium:
+def judge_equilibrium(game: Path | str | None) -> Equilibrium | None:
     """Judge the equilibrium of a game: a file, an FMU's own file, a game of the package by its name.
+
+    None if some players are elsewhere: nothing is known of their costs.
 
     Raises GameError if the game is none, has no equilibrium or an FMU holds none, BuildError if the
     installation lacks the host tool.
@@ -133,7 +135,7 @@ def _game_in(fmu: Path) -> bytes:
         raise ModelError(f"{fmu} cannot be read as an FMU of a game: {reason(error)}") from error
 
 
-def _judged(game: Path) -> Equilibrium:
+def _judged(game: Path) -> Equilibrium | None:
     tool = host_tool()
     try:
         finished = subprocess.run(
@@ -150,6 +152,8 @@ def _judged(game: Path) -> Equilibrium:
     if finished.returncode != 0:
         raise BuildError(f"{tool.name} ended with status {finished.returncode}: {finished.stderr.strip()}")
     told = json.loads(finished.stdout)
+    if told is None:
+        return None
     return Equilibrium(
         kind=Kind(told["kind"]),
         x_star=np.array(told["x_star"]),

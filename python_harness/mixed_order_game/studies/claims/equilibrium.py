@@ -21,8 +21,8 @@ def nash_equilibrium_exists(game: GameParameters, fmu: Path) -> Claim:
     An FMU whose costs have expressions cannot be instantiated unless it found such a point; what is known of
     it is judged by the game in the FMU.
     """
-    if has_expressions(game.expressions, "cost"):
-        return _of_expressions(judge_equilibrium(fmu))
+    if has_expressions(game.expressions, "cost") and (found := judge_equilibrium(fmu)):
+        return _of_expressions(found)
     verdict, reason = _judge(game)
     figures = {"m": monotonicity_constant(game)}
     return Claim("nash_equilibrium", "There is a unique Nash equilibrium x*", verdict, reason, figures)
