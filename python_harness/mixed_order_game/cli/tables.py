@@ -35,11 +35,9 @@ def print_info(model: Model, *, variables: bool = False) -> None:
     edges = ", ".join(f"{i}{sign}{j}" + (f" ({w:g})" if w != 1.0 else "") for i, j, w in model.edges)
     grid.add_row("graph", Text(edges))
     grid.add_row("gains", ", ".join(f"{name} = {value:g}" for name, value in model.gains.items()))
-    for name, told in _particulars(model):
+    for name, told in _particulars(model, data):
         grid.add_row(name, told)
     grid.add_row("experiment", f"{model.stop_time:g} s, step {model.step:g} s, tolerance {model.tolerance:g}")
-    if found := data["equilibrium"]:
-        grid.add_row("equilibrium", Text(" ".join(dict.fromkeys([found["sentence"], *found["warnings"]]))))
     counts = ", ".join(f"{count} {kind}" for kind, count in data["variable_counts"].items())
     grid.add_row("variables", counts)
     show(grid, console)
@@ -81,14 +79,16 @@ def print_info(model: Model, *, variables: bool = False) -> None:
         show(table, console)
 
 
-def _particulars(model: Model) -> Iterator[tuple[str, str]]:
-    """What not every FMU has: expressions, and what it waits for."""
+def _particulars(model: Model, data: dict[str, Any]) -> Iterator[tuple[str, str | Text]]:
+    """What not every FMU has: expressions, what it waits for, an equilibrium that it knows."""
     for part, numbers in model.expressions.items():
         yield "expressions", f"{PARTS[part]} of {_counted(numbers, model.players)}"
     if model.elsewhere:
         yield "elsewhere", f"players {', '.join(map(str, model.elsewhere))}"
     for number, step in longest_sampled_step(model).items():
         yield "external plant", f"of player {number}: communication steps below {step:.2g} s"
+    if found := data["equilibrium"]:
+        yield "equilibrium", Text(" ".join(dict.fromkeys([found["sentence"], *found["warnings"]])))
 
 
 def info_data(model: Model, *, variables: bool = False) -> dict[str, Any]:
