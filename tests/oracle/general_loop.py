@@ -131,6 +131,9 @@ class GeneralLoop:
             ]
         )
 
+    def _rate_until(self, last: float) -> Callable[[float, FloatArray], FloatArray]:
+        return lambda t, state: self.rate(min(t, last), state)
+
     def solve(self, times: FloatArray, rtol: float = 1e-9, atol: float = 1e-10) -> FloatArray:
         """States (T, n) at times (T,) in s from 0 on; the integration begins anew where disturbances jump.
 
@@ -144,9 +147,8 @@ class GeneralLoop:
         start, state = 0.0, states[0][0]
         for end in ends:
             within = times[(times > start) & (times <= end)]
-            before = float(np.nextafter(end, start))  # where disturbances have not jumped yet
             found = solve_ivp(
-                lambda t, state, last=before: self.rate(min(t, last), state),
+                self._rate_until(float(np.nextafter(end, start))),  # before disturbances jump
                 (start, end),
                 state,
                 "DOP853",

@@ -9,7 +9,7 @@ from typer.testing import CliRunner, Result
 import mixed_order_game as mog
 from mixed_order_game.cli.app import app
 from mixed_order_game.fmu.build import build_fmu, shipped_games
-from mixed_order_game.game.equilibrium import Kind, judge_equilibrium
+from mixed_order_game.game.equilibrium import Equilibrium, Kind, judge_equilibrium
 from mixed_order_game.game.parameters import game_parameters
 from mixed_order_game.studies.claims.equilibrium import nash_equilibrium_exists
 from mixed_order_game.studies.claims.verdict import Verdict
@@ -54,6 +54,12 @@ AT_MOST = {
 }
 
 
+def judged(game: Path | str) -> Equilibrium:
+    found = judge_equilibrium(game)
+    assert found is not None
+    return found
+
+
 def written(folder: Path, cost: str, more: str = 'z0 = "x0"\ny0 = "x0"') -> Path:
     path = folder / "game.toml"
     path.write_text(GAME % (more, cost), encoding="utf-8")
@@ -66,7 +72,7 @@ def check(path: Path) -> Result:
 
 @pytest.mark.parametrize("name", sorted(shipped_games()))
 def test_shipped_games_have_one_equilibrium(name: str) -> None:
-    found = judge_equilibrium(name)
+    found = judged(name)
     assert found.kind is (Kind.NASH if name in EVERYWHERE else Kind.LOCAL)
     assert found.warnings == ()
     assert found.monotonicity > 0.0
@@ -77,7 +83,7 @@ def test_shipped_games_have_one_equilibrium(name: str) -> None:
 def test_a_game_with_two_equilibria(tmp_path: Path) -> None:
     # each alone has minima at -1 and 1, and the coupling leaves four equilibria
     path = written(tmp_path, "(x[i]^2 - 1)^2 + 0.1 * x[1] * x[2]")
-    found = judge_equilibrium(path)
+    found = judged(path)
     assert found.kind is Kind.LOCAL
     assert found.others
     for x in found.others:
@@ -91,7 +97,7 @@ def test_a_game_with_two_equilibria(tmp_path: Path) -> None:
 
 def test_no_strong_monotonicity(tmp_path: Path) -> None:
     # P' = [[2, 3], [3, 2]]: m = -1
-    found = judge_equilibrium(written(tmp_path, "x[i]^2 + 3 * x[1] * x[2] + x[i]"))
+    found = judged(written(tmp_path, "x[i]^2 + 3 * x[1] * x[2] + x[i]"))
     assert found.monotonicity == pytest.approx(-1.0)
     assert found.kind is Kind.NASH
     (warning,) = found.warnings
@@ -105,7 +111,7 @@ def test_an_open_second_order_condition(tmp_path: Path) -> None:
     )
     path = tmp_path / "open.toml"
     path.write_text(text, encoding="utf-8")
-    found = judge_equilibrium(path)
+    found = judged(path)
     assert found.kind is Kind.OPEN
     assert "The second-order condition is open" in check(path).stderr
     fmu = build_fmu(path, tmp_path / "open.fmu")
@@ -120,18 +126,18 @@ def test_a_concave_cost_is_an_error_that_names_the_player(tmp_path: Path) -> Non
     assert done.exit_code == 1
     assert "player[2].cost is concave in the player's own action" in done.stderr
     with pytest.raises(mog.GameError, match=r"player\[2\].cost is concave"):
-        judge_equilibrium(path)
+        judged(path)
 
 
 def test_estimates_that_begin_where_a_cost_is_undefined(tmp_path: Path) -> None:
     path = written(tmp_path, "x[i] - log(x[i]) + 0.1 * x[1] * x[2]", "")
-    found = judge_equilibrium(path)
+    found = judged(path)
     assert found.undefined_at_start == (1, 2)
     assert "cost is not finite at its first estimates" in found.warnings[0]
     fmu = build_fmu(path, tmp_path / "game.fmu")
     with pytest.raises(mog.MixedOrderGameError, match=r"expected y0\[1,j,l\] at which .* z0"):
         mog.run(fmu, stop_time=0.1)
-    assert judge_equilibrium(written(tmp_path, "x[i] - log(x[i]) + 0.1 * x[1] * x[2]")).warnings == ()
+    assert judged(written(tmp_path, "x[i] - log(x[i]) + 0.1 * x[1] * x[2]")).warnings == ()
 
 
 def test_a_search_that_begins_where_a_cost_is_undefined(tmp_path: Path) -> None:
@@ -141,7 +147,7 @@ def test_a_search_that_begins_where_a_cost_is_undefined(tmp_path: Path) -> None:
 
 def test_gradients_that_vanish_where_costs_are_undefined_are_no_equilibrium(tmp_path: Path) -> None:
     # 0.2 - 1 / (1 + x_i) + 0.1 x_j vanishes at x_i = x_j = -4.7, too, where log(1 + x_i) is none
-    found = judge_equilibrium(written(tmp_path, "0.2 * x[i] - log(1 + x[i]) + 0.1 * x[1] * x[2]"))
+    found = judged(written(tmp_path, "0.2 * x[i] - log(1 + x[i]) + 0.1 * x[1] * x[2]"))
     assert found.x_star.min() > -1.0
     assert all(x.min() > -1.0 for x in found.others)
 
@@ -150,7 +156,7 @@ def test_an_fmu_is_judged_by_its_own_file(tmp_path: Path) -> None:
     path = written(tmp_path, "cosh(x[i] - i) + 0.1 * x[1] * x[2]")
     fmu = build_fmu(path, tmp_path / "game.fmu")
     path.unlink()
-    assert judge_equilibrium(fmu).kind is Kind.NASH
+    assert judged(fmu).kind is Kind.NASH
     claim = nash_equilibrium_exists(game_parameters(mog.read_model(fmu)), fmu)
     assert claim.verdict is Verdict.HOLDS
     assert claim.reason.startswith("x* is a Nash equilibrium: every cost is convex")
