@@ -323,8 +323,8 @@ void read_players(const TomlEntry& tables, const TomlEntry& defaults, Shape& sha
     shape.order.push_back(player["order"].integer(1, 2));
   }
   if (hosted.empty()) tables.fail("a player that is not elsewhere");
-  if (hosted.size() != at(shape.players)) shape.hosted = hosted;
-  if (std::find(external.begin(), external.end(), 1) != external.end()) shape.external = external;
+  if (hosted.size() != at(shape.players)) shape.hosted = std::move(hosted);
+  if (std::find(external.begin(), external.end(), 1) != external.end()) shape.external = std::move(external);
 }
 
 /// What belongs to a plant, of a player whose plant is outside; keys that only the defaults have are for the others.

@@ -184,10 +184,11 @@ void LocatedConditions::refuse_sliding(Real t, const Real* state, const Real* in
   loop_.evaluate(t, state, inputs, after, signals_, rate_after_.data());
   const auto families = this->families();
   for (int f = 0; f < static_cast<int>(families.size()); ++f) {
-    const auto& [switching, first, acts] = families[at(f)];
-    for (int k = 0; acts && k < switching->count(); ++k) {
-      const Real held_before = before[at(first + k)];
-      const Real held_after = after[at(first + k)];
+    const auto& family = families[at(f)];
+    const auto& switching = family.switching;
+    for (int k = 0; family.acts && k < switching->count(); ++k) {
+      const Real held_before = before[at(family.first + k)];
+      const Real held_after = after[at(family.first + k)];
       if (held_before == held_after || !switching->is_located(k) || switching->is_bend(k)) continue;
       if (!switching->is_active(k, leaves(f, t, state, inputs, after))) continue;
       const Real direction = held_after > held_before ? 1.0 : -1.0;

@@ -83,9 +83,9 @@ Interval cosine(const Interval& a) {
   Interval result = hull({about(std::cos(a.lower)), about(std::cos(a.upper))});
   // extremes at k pi, with a margin for the rounding of pi
   constexpr Real margin = 1e-7;
-  const Real first = std::ceil((a.lower - margin) / std::numbers::pi);
-  for (Real k = first; k * std::numbers::pi <= a.upper + margin; k += 1.0) {
-    result = hull({result, Interval::of(std::fmod(std::abs(k), 2.0) == 0.0 ? 1.0 : -1.0)});
+  const int first = static_cast<int>(std::ceil((a.lower - margin) / std::numbers::pi));
+  for (int k = first; k * std::numbers::pi <= a.upper + margin; ++k) {
+    result = hull({result, Interval::of(k % 2 == 0 ? 1.0 : -1.0)});
   }
   return within(result, {-1.0, 1.0});
 }

@@ -15,6 +15,7 @@ namespace grammar {
 
 using namespace peg;  // NOLINT(google-build-using-namespace): the names of rules
 
+// NOLINTBEGIN(readability-identifier-naming): rules are named as the library's own
 // clang-format off
 template <typename Rule> struct token : seq<Rule, star<space>> {};
 template <char... Characters> struct symbol : token<string<Characters...>> {};
@@ -73,6 +74,7 @@ struct conjunction : seq<negation, star<if_must<token<word_and>, negation>>> {};
 struct expression : seq<conjunction, star<if_must<token<word_or>, conjunction>>> {};
 struct whole : must<star<space>, expression, eof> {};
 // clang-format on
+// NOLINTEND(readability-identifier-naming)
 
 template <typename Rule>
 inline constexpr const char* expected = nullptr;
