@@ -50,7 +50,7 @@ Position place_of(const GameError& error, const Places& places) {
   return {1, 1};
 }
 
-std::string quoted(std::string_view text) {
+std::string json_string(std::string_view text) {
   constexpr const char* digits = "0123456789abcdef";
   std::string shown = "\"";
   for (const char c : text) {
@@ -75,12 +75,12 @@ std::string checked_game(std::string_view text, const GameError* error) {
   if (error == nullptr) return "{\"problem\": null}\n";
   const Places places = places_of(text);
   const auto [line, column] = place_of(*error, places);
-  std::string answer = "{\"problem\": {\"message\": " + quoted(error->what()) +
-                       ", \"entry\": " + quoted(error->entry()) + ", \"line\": " + std::to_string(line) +
+  std::string answer = "{\"problem\": {\"message\": " + json_string(error->what()) +
+                       ", \"entry\": " + json_string(error->entry()) + ", \"line\": " + std::to_string(line) +
                        ", \"column\": " + std::to_string(column) + "},\n\"places\": {";
   const char* separator = "\n";
   for (const auto& [entry, position] : places) {
-    answer += separator + quoted(entry) + ": " + pair_of(position);
+    answer += separator + json_string(entry) + ": " + pair_of(position);
     separator = ",\n";
   }
   return answer + "}}\n";
