@@ -16,26 +16,12 @@ from scipy.optimize import root
 import mixed_order_game as mog
 from mixed_order_game.errors import GameError
 from mixed_order_game.fmu.build import build_fmu
+from tests.three_players import head
 
 K = 0.2784645427610738
-GAME = """
-title = "Three sellers with exponential demand"
-dimension = 1
-[gains]
-k1 = 10.0
-k2 = 1.0
-k3 = 50.0
-k4 = 20.0
-beta = 5.0
-delta = 2.0
-epsilon = 0.5
-[rbf]
-centers = [-1.0, 0.0, 1.0, 2.0]
-width = 5.0
-W_max = 1000.0
-[graph]
-edges = [[1, 2], [2, 3, 0.5], [3, 1]]
-[parameters]
+GAME = (
+    head()
+    + """[parameters]
 price = { value = 12.0, min = 0.0, max = 100.0, description = "price at no demand" }
 h = [5.0, 7.0, 6.0]
 slope = 0.1
@@ -68,6 +54,7 @@ x0 = 0.5
 [player.dynamics]
 expression = "sum(R[i,j]*x[j]^3 for j in 1..N if j != i) / (1 + x[i]^2) - v[2] * log(2 + v[i]^2)"
 """
+)
 H = np.array([5.0, 7.0, 6.0])
 A = np.array([[0.0, 1.0, 1.0], [1.0, 0.0, 0.5], [1.0, 0.5, 0.0]])
 SECOND = np.array([False, True, True])

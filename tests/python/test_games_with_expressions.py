@@ -31,25 +31,9 @@ from mixed_order_game.theory.spectrum import (
     nash_equilibrium,
     spectral_abscissa,
 )
+from tests.three_players import head
 
-HEAD = """
-title = "Three sellers with exponential demand"
-dimension = 1
-[gains]
-k1 = 10.0
-k2 = 1.0
-k3 = 50.0
-k4 = 20.0
-beta = 5.0
-delta = 12.0
-epsilon = 0.1
-[rbf]
-centers = [-1.0, 0.0, 1.0, 2.0]
-width = 5.0
-W_max = 1000.0
-[graph]
-edges = [[1, 2], [2, 3], [3, 1]]
-"""
+HEAD = head(delta=12.0, epsilon=0.1, weight=1.0)
 GAME = (
     HEAD
     + """

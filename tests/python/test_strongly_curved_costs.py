@@ -12,26 +12,12 @@ from scipy.integrate import solve_ivp
 
 import mixed_order_game as mog
 from mixed_order_game.fmu.build import build_fmu
+from tests.three_players import head
 
 K = 0.2784645427610738
-GAME = """
-title = "Strongly curved costs"
-dimension = 1
-[gains]
-k1 = 10.0
-k2 = 1.0
-k3 = 200.0
-k4 = 20.0
-beta = 5.0
-delta = 2.0
-epsilon = 0.1
-[rbf]
-centers = [-1.0, 0.0, 1.0, 2.0]
-width = 5.0
-W_max = 1000.0
-[graph]
-edges = [[1, 2], [2, 3, 0.5], [3, 1]]
-[defaults]
+GAME = (
+    head(k3=200.0, epsilon=0.1)
+    + """[defaults]
 order = 2
 y0 = "x0"
 cost = { expression = "%s" }
@@ -47,6 +33,7 @@ x0 = -1.0
 name = "c"
 x0 = 0.9
 """
+)
 A = np.array([[0.0, 1.0, 1.0], [1.0, 0.0, 0.5], [1.0, 0.5, 0.0]])
 SECOND = np.array([False, True, True])
 Gradient = Callable[[np.ndarray, np.ndarray], np.ndarray]  # of own actions and the sums of all

@@ -14,26 +14,10 @@ from scipy.special import ndtri
 import mixed_order_game as mog
 from mixed_order_game.fmu.build import build_fmu
 from tests.conftest import FmuOf
+from tests.three_players import head
 
 K = 0.2784645427610738
-HEAD = """
-title = "Three players"
-dimension = 1
-[gains]
-k1 = 10.0
-k2 = 1.0
-k3 = 50.0
-k4 = 20.0
-beta = 5.0
-delta = 2.0
-epsilon = 0.5
-[rbf]
-centers = [-1.0, 0.0, 1.0, 2.0]
-width = 5.0
-W_max = 1000.0
-[graph]
-edges = [[1, 2], [2, 3, 0.5], [3, 1]]
-"""
+HEAD = head()
 H = np.array([4.0, 2.0, 1.5])
 A = np.array([[0.0, 1.0, 1.0], [1.0, 0.0, 0.5], [1.0, 0.5, 0.0]])
 SECOND = np.array([False, True, True])
