@@ -75,3 +75,12 @@ def test_the_citation_is_of_this_version() -> None:
     readme = " ".join((ROOT / "README.md").read_text(encoding="utf-8").split())
     assert paper is not None
     assert f"*{paper[1]}*" in readme
+
+
+def test_a_step_of_dev_that_fails_ends_it() -> None:
+    """In a list of && or || the shell goes on inside a function after an error."""
+    text = (ROOT / "dev").read_text(encoding="utf-8")
+    functions = re.findall(r"^(\w+)\(\) \{", text, re.MULTILINE)
+    assert "build" in functions
+    for line in text.splitlines():
+        assert not re.search(rf"(?:^|[;)] )\s*(?:{'|'.join(functions)})\b[^;]*(?:&&|\|\|)", line), line
