@@ -8,7 +8,7 @@
 namespace mixed_order_game {
 
 GainRows::GainRows(const Shape& shape) : k3(at(shape.hosts())) {
-  for (AlignedVector* row : {&k, &k2, &beta, &delta, &sharpness, &steepest, &W_max}) {
+  for (AlignedVector* row : {&k, &k2, &beta, &delta, &sharpness, &steepest, &curvature, &W_max}) {
     row->resize(at(shape.own_entries()));
   }
   sharpness_of_activations.resize(at(shape.hosts()));
@@ -29,6 +29,7 @@ void GainRows::refresh(const Shape& shape, const Gains& gains, const RbfNetwork&
     beta[p] = gains.beta[i];
     delta[p] = gains.delta[i];
     sharpness[p] = robust_term_constant * gains.delta[i] / gains.epsilon[i];
+    curvature[p] = 0.7698003589195010 * delta[p] * sharpness[p] * sharpness[p];
     steepest[p] = robust_term_constant * gains.delta[i] * gains.delta[i] / gains.epsilon[i];
   }
   for (int h = 0; h < shape.hosts(); ++h) k3[at(h)] = gains.k3[at(shape.host(h))];
@@ -39,7 +40,8 @@ ClosedLoop::ClosedLoop(Parameters parameters)
       layout_(parameters_.shape),
       gains_(parameters_.shape),
       is_whole_(shape().hosts_all() && shape().external.empty()),
-      number_heard_(at(shape().players), -1) {
+      number_heard_(at(shape().players), -1),
+      first_switch_{parameters_.first_switch(0), parameters_.first_switch(1), parameters_.first_switch(2)} {
   refresh();
   inputs_ = InputLayout(parameters_);
   for (int p = 0; p < shape().own_entries(); ++p) {
@@ -103,14 +105,16 @@ Plants ClosedLoop::plants(const Real* state, const Real* inputs, Signals& signal
 void ClosedLoop::evaluate_errors(const Real* state, const Real* inputs, const Modes& modes, Signals& signals) const {
   const auto& [shape, gains, strategy, rbf, graph, cost, dynamics, disturbance, initial, named, guess] = parameters_;
   const auto [x, reference] = plants(state, inputs, signals);
-  Real* e = signals.error.data();
   const Real* gradient = signals.gradient.data();
+  const Real* k2 = gains_.k2.data();
+  Real* e = signals.error.data();
+  Real* shared = signals.shared.data();
 
-  cost->own_gradients(state + layout_.estimates(), shape.actions(), signals.gradient.data(), held(0, modes));
+  cost->own_gradients(state + layout_.estimates(), shape.actions(), signals.gradient.data(), held(of_cost, modes));
   for (std::size_t p = 0; p < own_.size(); ++p) {
-    const std::size_t k = at(own_[p].entry);
-    signals.shared[k] = terms::shared_signal(own_[p].second, x[k], reference[k]);
-    e[p] = terms::error(own_[p].second, x[k], reference[k], gains_.k2[p], gradient[p]);
+    const auto& [k, to_x, to_reference, second] = own_[p];
+    shared[k] = terms::shared_signal(second, x[k], reference[k]);
+    e[p] = terms::error(second, x[k], reference[k], k2[p], gradient[p]);
   }
   for (std::size_t k = 0; k < inputs_.heard().size(); ++k) {
     const Real* xbar = inputs + inputs_.xbar_of(static_cast<int>(k));
@@ -178,21 +182,24 @@ void ClosedLoop::evaluate(Real t, const Real* state, const Real* inputs, const M
   }
   const auto [x, reference] = plants(state, inputs, signals);
   if (strategy.perturbed) {
-    dynamics->values(x, reference, g, held(1, modes));
-    disturbance->values(t, d, held(2, modes));
+    dynamics->values(x, reference, g, held(of_dynamics, modes));
+    disturbance->values(t, d, held(of_disturbance, modes));
     for (int p = 0; p < n; ++p) d[p] += d_ext[p];
   } else {
     std::fill_n(g, n, 0.0);
     std::copy_n(d_ext, n, d);
   }
 
+  const Real* k = gains_.k.data();
+  const Real* k2 = gains_.k2.data();
+  Real* control = signals.control.data();
   for (std::size_t p = 0; p < own_.size(); ++p) {
     const auto& [entry, to_x, to_reference, second] = own_[p];
-    const Real u = terms::control(gains_.k[p], e[p], s[p], phi[p]);
+    const Real u = terms::control(k[p], e[p], s[p], phi[p]);
     const Real driven = u + g[p] + d[p];
-    signals.control[p] = u;
+    control[p] = u;
     if (to_x >= 0) rate[to_x] = second ? reference[entry] : driven;  // x' = v or x' = u + g + d
-    if (to_reference >= 0) rate[to_reference] = second ? driven : terms::reference_rate(gains_.k2[p], gradient[p]);
+    if (to_reference >= 0) rate[to_reference] = second ? driven : terms::reference_rate(k2[p], gradient[p]);
   }
   kernel.estimate_rates(shape.hosts(), shape.players, shape.dimension, graph.hosted_neighbours(), graph.neighbours(),
                         gains_.k3.data(), state + layout_.estimates(), signals.shared.data(),

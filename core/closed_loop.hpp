@@ -3,6 +3,8 @@
 // Plants, seeking laws, estimates, network and adaptation of the mixed-order game; notation.md lists the symbols.
 #pragma once
 
+#include <array>
+
 #include "loop/input_layout.hpp"
 #include "loop/terms.hpp"
 #include "parameters.hpp"
@@ -23,6 +25,7 @@ struct GainRows {
   AlignedVector delta;
   AlignedVector sharpness;  ///< K delta / epsilon
   AlignedVector steepest;   ///< K delta^2 / epsilon, the largest slope of the robust term
+  AlignedVector curvature;  ///< 4 / (3 sqrt 3) delta (K delta / epsilon)^2, the largest |phi''|
   AlignedVector W_max;
   std::vector<Real> own_centers;           ///< as RbfNetwork's, of hosted players, where others are elsewhere
   AlignedVector sharpness_of_activations;  ///< 1 / rho^2, by player
@@ -57,6 +60,12 @@ class ClosedLoop {
   void initial_state(Real* state) const;
   /// The same from other values, such as those of a direction, and not scaled.
   void initial_state(const InitialState& initial, Real* state) const;
+
+  /// Cost, dynamics and disturbance, for what their switches hold.
+  enum Family : std::size_t { of_cost, of_dynamics, of_disturbance };
+  [[nodiscard]] const Real* held(Family family, const Modes& modes) const {
+    return modes.data() + first_switch_[family];
+  }
 
   /// What the plants stand at: in the state, or in the signals' scratch where some of it are inputs.
   Plants plants(const Real* state, const Real* inputs, Signals& signals) const;
@@ -114,10 +123,6 @@ class ClosedLoop {
   void add_consensus_with_others(const Real* state, const Real* inputs, Real* rate) const;
 
   [[nodiscard]] bool is_any_on_sphere(const Modes& modes) const;
-  /// What the switches of a family hold.
-  [[nodiscard]] const Real* held(int family, const Modes& modes) const {
-    return modes.data() + parameters_.first_switch(family);
-  }
 
   Parameters parameters_;
   StateLayout layout_;
@@ -126,6 +131,7 @@ class ClosedLoop {
   bool is_whole_;  // all players with their plants: joint actions lie in the state
   std::vector<OwnEntry> own_;
   std::vector<int> number_heard_;  // of each player elsewhere among those heard, otherwise -1
+  std::array<int, 3> first_switch_;
   Real time_origin_ = 0.0;
 };
 

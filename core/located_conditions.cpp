@@ -19,6 +19,7 @@ constexpr int disturbance = 2;
 LocatedConditions::LocatedConditions(const ClosedLoop& loop)
     : loop_(loop),
       columns_(loop.shape().own_entries()),
+      has_switches_(count(loop.parameters()) > columns_),
       signals_(loop.shape()),
       plants_(loop.shape()),
       inputs_at_rest_(at(loop.inputs().size())),
@@ -89,6 +90,7 @@ void LocatedConditions::begin(Real t, const Real* state, const Real* inputs, Mod
 void LocatedConditions::event_functions(Real t, const Real* state, const Real* inputs, const Modes& modes,
                                         Real tolerance, Signals& signals, Real* values) const {
   loop_.event_functions(state, inputs, modes, tolerance, signals, values);
+  if (!has_switches_) return;
   values += columns_;
   const auto families = this->families();
   for (std::size_t f = 0; f < families.size(); ++f) {
@@ -103,12 +105,14 @@ void LocatedConditions::event_functions(Real t, const Real* state, const Real* i
 }
 
 Real LocatedConditions::next_event(Real t, const Modes& modes) const {
+  if (!has_switches_) return std::numeric_limits<Real>::infinity();
   const Family timed = families()[disturbance];
   if (!timed.acts) return std::numeric_limits<Real>::infinity();
   return timed.switching->next_event(leaves(t, modes), loop_.time_origin(), t);
 }
 
 bool LocatedConditions::is_due(Real t, const Modes& modes) const {
+  if (!has_switches_) return false;
   const Family timed = families()[disturbance];
   if (!timed.acts) return false;
   Modes now = modes;

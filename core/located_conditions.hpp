@@ -63,6 +63,7 @@ class LocatedConditions {
 
   const ClosedLoop& loop_;
   int columns_;
+  bool has_switches_;  // beside the columns
   mutable Signals signals_;
   mutable Signals plants_;  // for actions and velocities of all players
   std::vector<Real> inputs_at_rest_;

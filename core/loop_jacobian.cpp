@@ -26,11 +26,12 @@ void LoopJacobian::linearize(const Real* state, const Plants& plants, const Sign
   const Parameters& parameters = loop_->parameters();
   const StateLayout& layout = loop_->layout();
   const int n = loop_->shape().actions();
-  const auto held = [&](int family) { return modes.data() + parameters.first_switch(family); };
-  parameters.cost->hessian_rows(state + layout.estimates(), n, hessian.data(), held(0));
+  parameters.cost->hessian_rows(state + layout.estimates(), n, hessian.data(), loop().held(ClosedLoop::of_cost, modes));
   if (parameters.strategy.perturbed) {
-    parameters.dynamics->jacobian(plants.x, plants.reference, dynamics.data(), held(1));
-    parameters.dynamics->velocity_jacobian(plants.x, plants.reference, dynamics_by_velocity.data(), held(1));
+    parameters.dynamics->jacobian(plants.x, plants.reference, dynamics.data(),
+                                  loop().held(ClosedLoop::of_dynamics, modes));
+    parameters.dynamics->velocity_jacobian(plants.x, plants.reference, dynamics_by_velocity.data(),
+                                           loop().held(ClosedLoop::of_dynamics, modes));
   } else {
     std::fill(dynamics.begin(), dynamics.end(), 0.0);
     std::fill(dynamics_by_velocity.begin(), dynamics_by_velocity.end(), 0.0);

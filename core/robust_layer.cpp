@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "kernels/kernels.hpp"
+
 namespace mixed_order_game {
 
 namespace {
@@ -29,12 +31,8 @@ RobustLayer::RobustLayer(const ClosedLoop& loop)
 void RobustLayer::find_weights(const LoopJacobian& jacobian, Real gamma, const Real* weight) {
   const StateLayout& layout = loop_.layout();
   const std::size_t columns = place_.size();
-  std::fill(weight_.begin(), weight_.end(), 0.0);
-  for (int m = 0; m < loop_.shape().neurons; ++m) {
-    const Real* activation = jacobian.activation.data() + at(m) * columns;
-    const Real* weight_of_w = weight + layout.weights_of(m);
-    for (std::size_t p = 0; p < columns; ++p) weight_[p] = std::max(weight_[p], activation[p] * weight_of_w[p]);
-  }
+  kernels().largest_products(static_cast<int>(columns), loop_.shape().neurons, jacobian.activation.data(),
+                             weight + layout.weights(), weight_.data());
   for (std::size_t p = 0; p < columns; ++p) {
     weight_[p] = place_[p] < 0 ? 0.0 : std::max(weight[place_[p]], gamma * loop_.gains().beta[p] * weight_[p]);
   }
@@ -55,13 +53,12 @@ bool RobustLayer::linearization_holds(const LoopJacobian& jacobian, const Signal
   };
 
   // A bound is nearly always enough, and needs no tanh: Taylor's remainder and the slope's change since the
-  // factorization, with |phi''| <= 4 / (3 sqrt 3) delta (K delta / epsilon)^2.
+  // factorization.
   Real bound = 0.0;
   for (std::size_t p = 0; p < columns; ++p) {
     const Real size = std::fabs(change(p));
-    const Real largest_curvature = 0.7698003589195010 * gains.delta[p] * gains.sharpness[p] * gains.sharpness[p];
     const Real slope = loop_.robust_term_slope(p, signals.robust[p]);
-    const Real defect = (0.5 * largest_curvature * size + std::fabs(slope - jacobian.slope[p])) * size;
+    const Real defect = (0.5 * gains.curvature[p] * size + std::fabs(slope - jacobian.slope[p])) * size;
     bound = std::max(bound, counted(p, defect) * weight_[p]);
   }
   if (gamma * bound <= tolerance) return true;

@@ -48,9 +48,7 @@ class StructuredNewton final : public NewtonSolver {
   std::vector<int> velocity_driven_;  // entries of order 1
   std::vector<int> accelerated_;      // entries of order 2
   std::vector<int> all_;
-  std::vector<int> moving_;   // entries whose plants the loop has
-  std::vector<int> sharing_;  // entries whose shared signals are unknowns
-  std::vector<int> entry_;    // per entry: where it lies in a joint action
+  std::vector<int> entry_;  // per entry: where it lies in a joint action
   // per entry, -1 where there is none: of order 2, dx is dxbar
   std::vector<int> shared_unknown_;  // number of dxbar in the core system
   std::vector<int> action_unknown_;  // number of dx
@@ -90,7 +88,7 @@ void StructuredNewton::refresh(const LoopJacobian& jacobian) {
   joint_ = shape.actions();
   blocks_.analyse(parameters.graph, loop().gains().k3, shape.dimension);
   for (std::vector<int>* numbers : {&host_, &shared_unknown_, &action_unknown_, &x_, &reference_, &velocity_driven_,
-                                    &accelerated_, &all_, &moving_, &sharing_, &entry_}) {
+                                    &accelerated_, &all_, &entry_}) {
     numbers->clear();
   }
   second_.clear();
@@ -108,8 +106,6 @@ void StructuredNewton::refresh(const LoopJacobian& jacobian) {
     shared_unknown_.push_back(second && !plant ? -1 : unknowns++);
     entry_.push_back(shape.entry_of_own(p));
     all_.push_back(p);
-    if (plant) moving_.push_back(p);
-    if (shared_unknown_.back() >= 0) sharing_.push_back(p);
     (second ? accelerated_ : velocity_driven_).push_back(p);
   }
   for (int p = 0; p < n_; ++p) {
@@ -328,8 +324,18 @@ void StructuredNewton::solve(Real* b) {
   core_->solve(core_rhs_.data());
 
   // back to estimates, actions, references and velocities
-  for (const int p : sharing_) shared_[at(entry_[at(p)])] = core_rhs_[at(shared_place_[at(p)])];
-  for (const int p : moving_) b[x_[at(p)]] = core_rhs_[at(action_place_[at(p)])];
+  for (const int p : velocity_driven_) {
+    const Real dz = core_rhs_[at(shared_place_[at(p)])];
+    shared_[at(entry_[at(p)])] = b[reference_[at(p)]] = dz;
+    error_change_[at(p)] = -dz;
+    if (plant_[at(p)] == 0) continue;
+    const Real dx = core_rhs_[at(action_place_[at(p)])];
+    b[x_[at(p)]] = dx;
+    error_change_[at(p)] = dx - dz;
+  }
+  for (const int p : accelerated_) {
+    if (plant_[at(p)] != 0) shared_[at(entry_[at(p)])] = b[x_[at(p)]] = core_rhs_[at(shared_place_[at(p)])];
+  }
   if (has_velocities) {
     for (int k = 0; k < joint_; ++k) {
       if (joint_x_[at(k)] >= 0) velocity_[at(k)] = (b[joint_x_[at(k)]] - velocity_[at(k)]) / gamma_;
@@ -337,11 +343,6 @@ void StructuredNewton::solve(Real* b) {
   }
   kernel.add_shared_signal(shape.hosts(), shape.players, shape.dimension, blocks_.shared_signal_gain().data(),
                            shared_.data(), dy);
-  for (const int p : velocity_driven_) {
-    Real& dz = b[reference_[at(p)]];
-    dz = shared_[at(entry_[at(p)])];
-    error_change_[at(p)] = (plant_[at(p)] != 0 ? b[x_[at(p)]] : 0.0) - dz;
-  }
   apply_hessian(accelerated_, dy);
   for (const int p : accelerated_) {
     if (plant_[at(p)] == 0) {

@@ -22,6 +22,7 @@ PolynomialDynamics::PolynomialDynamics(const Shape& shape)
     : UnknownDynamics(Coefficients(declared, shape.players, shape.dimension)), shape_(shape) {
   pattern_.start.assign(at(shape.own_entries() + 1), 0);
   no_velocities_ = pattern_;
+  for (int row = 0; row < shape.own_entries(); ++row) player_.push_back(shape.player_of_own(row));
 }
 
 std::unique_ptr<UnknownDynamics> PolynomialDynamics::clone() const {
@@ -53,13 +54,17 @@ void PolynomialDynamics::refresh() {
 
 template <typename Scalar, typename Gain>
 void PolynomialDynamics::values_as(const Scalar* x, Gain gain_of, Scalar* g) const {
-  for (int row = 0; row < pattern_.rows(); ++row) {
+  const int* column = pattern_.column.data();
+  const Real* G = linear_.data();
+  const Real* H = square_.data();
+  int k = 0;
+  for (std::size_t row = 0; row < player_.size(); ++row) {
     Scalar sum = 0.0;
-    for (int k = pattern_.start[at(row)]; k < pattern_.start[at(row + 1)]; ++k) {
-      const Scalar& xj = x[pattern_.column[at(k)]];
-      sum += (linear_[at(k)] + square_[at(k)] * xj) * xj;  // G x_jl + H x_jl^2
+    for (const int end = pattern_.start[row + 1]; k < end; ++k) {
+      const Scalar& xj = x[column[k]];
+      sum += (G[k] + H[k] * xj) * xj;  // G x_jl + H x_jl^2
     }
-    g[row] = gain_of(shape_.player_of_own(row)) * sum;
+    g[row] = gain_of(player_[row]) * sum;
   }
 }
 
@@ -78,10 +83,11 @@ void PolynomialDynamics::values(const CoefficientsAs<Dependencies>& of, const De
 }
 
 void PolynomialDynamics::jacobian(const Real* x, const Real* /*v*/, Real* values, const Real* /*held*/) const {
-  for (int row = 0; row < pattern_.rows(); ++row) {
-    for (int k = pattern_.start[at(row)]; k < pattern_.start[at(row + 1)]; ++k) {
+  for (std::size_t row = 0; row < player_.size(); ++row) {
+    const Real scale = coefficients[gain][at(player_[row])];
+    for (int k = pattern_.start[row]; k < pattern_.start[row + 1]; ++k) {
       const Real xj = x[pattern_.column[at(k)]];
-      values[k] = coefficients[gain][at(shape_.player_of_own(row))] * (linear_[at(k)] + 2.0 * square_[at(k)] * xj);
+      values[k] = scale * (linear_[at(k)] + 2.0 * square_[at(k)] * xj);
     }
   }
 }

@@ -35,6 +35,7 @@ class PolynomialDynamics : public UnknownDynamics {
 
   Shape shape_;
   bool is_built_ = false;
+  std::vector<int> player_;  // of each row
   SparseRows pattern_;
   SparseRows no_velocities_;
   std::vector<Real> linear_;  // along pattern_

@@ -65,17 +65,18 @@ Real QuadraticCost::value(int i, const Real* x) const {
 }
 
 void QuadraticCost::own_gradients(const Real* points, int stride, Real* gradient, const Real* /*held*/) const {
-  const std::vector<Real>& q = coefficients[quadratic];
+  const Real* q = coefficients[quadratic].data();
+  const int* start = neighbours_.start.data();
+  const int* neighbour = neighbours_.column.data();
+  const Real* c = neighbour_cost_.data();
   const int hosts = static_cast<int>(host_.size());
   for (int l = 0; l < shape_.dimension; ++l) {
     const Real* l_il = coefficients[linear].data() + l * shape_.players;
     for (int h = 0; h < hosts; ++h) {
       const Real* row = points + h * stride + l * shape_.players;
       const int i = host_[at(h)];
-      gradient[l * hosts + h] = own_gradient(i, q[at(i)], l_il[i], row, [&](auto visit) {
-        for (int k = neighbours_.start[at(h)]; k < neighbours_.start[at(h + 1)]; ++k) {
-          visit(neighbours_.column[at(k)], neighbour_cost_[at(k)]);
-        }
+      gradient[l * hosts + h] = own_gradient(i, q[i], l_il[i], row, [&](auto visit) {
+        for (int k = start[h]; k < start[h + 1]; ++k) visit(neighbour[k], c[k]);
       });
     }
   }

@@ -1,4 +1,4 @@
-// Adaptation of the weights, W' = beta e (S - radial W), and the sums w'S and w'w; part of level.cpp.
+// Adaptation of the weights, W' = beta e (S - radial W), the sums w'S and w'w, and largest products; part of level.cpp.
 
 void column_products(int n, int rows, const double* a, const double* b, double* sum) {
   const Index size = static_cast<Index>(rows) * n;
@@ -7,6 +7,19 @@ void column_products(int n, int rows, const double* a, const double* b, double* 
     Width total = {};
     for (Index k = p; k < size; k += n) total += load_as<Width>(a + k) * load_as<Width>(b + k);
     store(total, sum + p);
+  });
+}
+
+void largest_products(int n, int rows, const double* a, const double* b, double* largest) {
+  const Index size = static_cast<Index>(rows) * n;
+  for_columns(n, [=](auto width, Index p) {
+    using Width = decltype(width);
+    Width found = {};
+    for (Index k = p; k < size; k += n) {
+      const Width product = load_as<Width>(a + k) * load_as<Width>(b + k);
+      found = product > found ? product : found;
+    }
+    store(found, largest + p);
   });
 }
 

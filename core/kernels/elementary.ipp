@@ -3,18 +3,25 @@
 inline VectorBits bits_of(const Vector& vector) { return reinterpret_cast<VectorBits>(vector); }
 inline Vector vector_of(const VectorBits& bits) { return reinterpret_cast<Vector>(bits); }
 
-/// out = function(vectors of a) for n numbers; out may be a.
-template <typename Function>
-inline void for_each_vector(int n, const double* a, double* out, Function function) {
+/// The first n numbers of a vector, the rest 0; n may be less than its length.
+inline Vector load_few(int n, const double* from) {
+  double few[vector_length];
+  for (int k = 0; k < vector_length; ++k) few[k] = k < n ? from[k] : 0.0;
+  return load(few);
+}
+
+/// out = function(vectors of a, ...) for n numbers; out may be one of them.
+template <typename Function, typename... Numbers>
+inline void for_each_vector(int n, double* out, Function function, const Numbers*... a) {
   if (n >= vector_length) {
-    const Vector last = function(load(a + n - vector_length));  // overlaps the one before: taken first, put last
-    for (int k = 0; k + vector_length < n; k += vector_length) store(function(load(a + k)), out + k);
-    store(last, out + n - vector_length);
+    const int end = n - vector_length;
+    const Vector last = function(load(a + end)...);  // overlaps the one before: taken first, put last
+    for (int k = 0; k < end; k += vector_length) store(function(load(a + k)...), out + k);
+    store(last, out + end);
     return;
   }
   double few[vector_length];
-  for (int k = 0; k < vector_length; ++k) few[k] = k < n ? a[k] : 0.0;
-  store(function(load(few)), few);
+  store(function(load_few(n, a)...), few);
   for (int k = 0; k < vector_length; ++k) {
     if (k < n) out[k] = few[k];
   }
@@ -59,7 +66,7 @@ inline Vector exponential_of(const Vector& a) {
   return a < low ? zero : value;
 }
 
-void exponential(int n, const double* a, double* out) { for_each_vector(n, a, out, exponential_of); }
+void exponential(int n, const double* a, double* out) { for_each_vector(n, out, exponential_of, a); }
 
 inline Vector tanh_of(const Vector& a) {
   const VectorBits sign_bit = VectorBits{} + static_cast<long long>(0x8000000000000000ULL);
@@ -76,9 +83,10 @@ inline Vector tanh_of(const Vector& a) {
 }
 
 void scaled_tanh(int n, const double* amplitude, const double* sharpness, const double* a, double* out) {
-  for (int k = 0; k < n; ++k) out[k] = sharpness[k] * a[k];
-  for_each_vector(n, out, out, tanh_of);
-  for (int k = 0; k < n; ++k) out[k] = amplitude[k] * out[k];
+  const auto term = [](const Vector& height, const Vector& slope, const Vector& e) {
+    return height * tanh_of(slope * e);
+  };
+  for_each_vector(n, out, term, amplitude, sharpness, a);
 }
 
 // Cody-Waite reduction by pi / 2 and the minimax polynomials of FreeBSD's msun; exact enough for |a| below 1e5.
@@ -113,13 +121,15 @@ void sinusoid(int n, double t, const double* amplitude, const double* frequency,
   constexpr double reducible = 1e5;
   double largest = 0.0;
   for (int k = 0; k < n; ++k) {
-    d[k] = frequency[k] * t + phase[k];
-    largest = fabs(d[k]) > largest ? fabs(d[k]) : largest;
+    const double angle = fabs(frequency[k] * t + phase[k]);
+    largest = angle > largest ? angle : largest;
   }
   if (largest < reducible) {
-    for_each_vector(n, d, d, sin_of);
+    const auto term = [t](const Vector& height, const Vector& rate, const Vector& start, const Vector& middle) {
+      return middle + height * sin_of(rate * t + start);
+    };
+    for_each_vector(n, d, term, amplitude, frequency, phase, bias);
   } else {
-    for (int k = 0; k < n; ++k) d[k] = sin(d[k]);
+    for (int k = 0; k < n; ++k) d[k] = bias[k] + amplitude[k] * sin(frequency[k] * t + phase[k]);
   }
-  for (int k = 0; k < n; ++k) d[k] = bias[k] + amplitude[k] * d[k];
 }

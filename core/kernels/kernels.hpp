@@ -70,6 +70,8 @@ struct Kernels {
                          const double* k3, const double* y, const double* xbar, double* rate);
   /// sum[p] = sum over m of a[m * n + p] * b[m * n + p]
   void (*column_products)(int n, int rows, const double* a, const double* b, double* sum);
+  /// largest[p] = the largest a[m * n + p] * b[m * n + p] over m, at least 0
+  void (*largest_products)(int n, int rows, const double* a, const double* b, double* largest);
   /// W' = beta e (S - radial W), row by row; radial[p] is 0 inside and w'S / W_max on the sphere.
   void (*weight_rates)(int n, int neurons, const double* beta, const double* e, const double* radial,
                        const double* activation, const double* weights, double* rate);

@@ -46,6 +46,7 @@ const Kernels MIXED_ORDER_GAME_JOIN(kernels_, MIXED_ORDER_GAME_LEVEL) = {
     activations_general,
     estimate_rates,
     column_products,
+    largest_products,
     weight_rates,
     dot,
     run_tape,

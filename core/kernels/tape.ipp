@@ -68,7 +68,7 @@ void run_tape(int count, const TapeInstruction* code, int lanes, int used, doubl
         each_used([](double x, double) { return log1p(x); });
         break;
       case Operation::sin:
-        for_each_vector(lanes, a, out, sin_of);
+        for_each_vector(lanes, out, sin_of, a);
         for (int k = 0; k < lanes; ++k) {
           if (!(fabs(a[k]) < 1e5)) out[k] = sin(a[k]);  // beyond its reduction
         }
@@ -98,7 +98,7 @@ void run_tape(int count, const TapeInstruction* code, int lanes, int used, doubl
         each_used([](double x, double) { return cosh(x); });
         break;
       case Operation::tanh:
-        for_each_vector(lanes, a, out, tanh_of);
+        for_each_vector(lanes, out, tanh_of, a);
         break;
       case Operation::erf:
         each_used([](double x, double) { return erf(x); });

@@ -404,6 +404,11 @@ TEST(Columns, FollowTheirFormulas) {
       kernel.column_products(n, rows, w, S, sum);
       return sum;
     });
+    const Array largest = on_every_level([&](const Kernels& kernel) {
+      Array found(n, 9.0);
+      kernel.largest_products(n, rows, w, S, found);
+      return found;
+    });
     const Array rates = on_every_level([&](const Kernels& kernel) {
       Array rate(rows * n);
       kernel.weight_rates(n, rows, beta, e, r, S, w, rate);
@@ -415,14 +420,16 @@ TEST(Columns, FollowTheirFormulas) {
       return rhs;
     });
     for (int p = 0; p < n; ++p) {
-      double product = 0.0;
+      double product = 0.0, greatest = 0.0;
       for (int m = 0; m < rows; ++m) {
         const int k = m * n + p;
         product += w[k] * S[k];
+        greatest = std::max(greatest, w[k] * S[k]);
         EXPECT_NEAR(rates[k], beta[p] * e[p] * (S[k] - r[p] * w[k]), 1e-12);
         EXPECT_NEAR(corrected[k], scale[p] * S[k] + e[p] * S[k] + onto_weight[p] * w[k], 1e-14);
       }
       EXPECT_NEAR(products[p], product, 1e-14);
+      EXPECT_EQ(largest[p], greatest);
     }
   }
 }
