@@ -6,15 +6,13 @@ each player at the equilibrium. Unsound in one of the ways that UNSOUND names.
 
 import tomllib
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from mixed_order_game.errors import GameError
 from mixed_order_game.game.gains import choose_gains
-from mixed_order_game.game.parameters import GameParameters
-from mixed_order_game.theory.game import game_from_tables
+from mixed_order_game.game.parameters import GameParameters, parameters_of
 from mixed_order_game.theory.spectrum import (
     linear_loop,
     monotonicity_constant,
@@ -32,7 +30,7 @@ def sound_game(seed: int) -> str:
     random = np.random.default_rng([seed, 1])
     while True:
         tables = _draft(random)
-        game = _parameters(tables)
+        game = parameters_of(tables)
         if not monotonicity_constant(game) > 0.2:
             continue
         if random.uniform() < 0.6:
@@ -159,12 +157,8 @@ def _player(random: np.random.Generator, i: int, N: int, D: int) -> Tables:
     }
 
 
-def _parameters(tables: Tables) -> GameParameters:
-    return game_from_tables(tables, Path("random")).parameters
-
-
 def _abscissa(tables: Tables) -> float:
-    return spectral_abscissa(linear_loop(_parameters(tables)))
+    return spectral_abscissa(linear_loop(parameters_of(tables)))
 
 
 def _push(game: GameParameters) -> float:

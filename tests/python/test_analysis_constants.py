@@ -7,13 +7,14 @@ import pytest
 from numpy.typing import NDArray
 
 from mixed_order_game.errors import GameError
+from mixed_order_game.game.parts import toml_of_game
 from mixed_order_game.theory.constants import (
     LoopConstants,
     dynamics_bound,
     dynamics_constants,
     loop_constants,
 )
-from mixed_order_game.theory.game import AnalysedGame, game_from_tables, read_game, toml_text, without_square
+from mixed_order_game.theory.game import AnalysedGame, read_game, without_square
 from mixed_order_game.theory.graph import consensus_blocks, is_connected
 from mixed_order_game.theory.lyapunov import identity_right_side, scaled_identity
 from tests.conftest import COEFFICIENT_GAMES, GAMES, FmuOf
@@ -85,11 +86,12 @@ def test_reader_of_fmus_matches_that_of_files(name: str, fmu_of: FmuOf) -> None:
     np.testing.assert_array_equal(of_fmu.parameters.dynamics_linear, of_file.parameters.dynamics_linear)
 
 
-def test_written_game_reads_back(path: Path, game: AnalysedGame, tmp_path: Path) -> None:
+def test_written_game_reads_back(game: AnalysedGame, tmp_path: Path) -> None:
     copy = tmp_path / "copy.toml"
-    copy.write_text(toml_text(game.tables), encoding="utf-8")
+    copy.write_text(toml_of_game(game.tables), encoding="utf-8")
     assert read_game(copy).tables == game.tables
-    linear = game_from_tables(without_square(game.tables), path)
+    copy.write_text(toml_of_game(without_square(game.tables)), encoding="utf-8")
+    linear = read_game(copy)
     assert not linear.parameters.dynamics_square.any()
     np.testing.assert_array_equal(linear.parameters.dynamics_linear, game.parameters.dynamics_linear)
 

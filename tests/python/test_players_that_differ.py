@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import mixed_order_game as mog
-from mixed_order_game.game.parameters import game_parameters
+from mixed_order_game.game.parameters import game_parameters, parameters_of
 from mixed_order_game.studies.claims.verdict import Verdict
 from mixed_order_game.studies.tune import TuneError, tune
 from mixed_order_game.studies.validate import validate
@@ -15,7 +15,6 @@ from mixed_order_game.theory import spectrum
 from mixed_order_game.theory.analysis import analyse
 from mixed_order_game.theory.constants import loop_constants
 from mixed_order_game.theory.findings import Analysis
-from mixed_order_game.theory.game import game_from_tables
 from mixed_order_game.theory.lyapunov import identity_right_side
 from tests.oracle import linear_loop
 from tests.oracle.game import Game, game_from_table
@@ -144,8 +143,7 @@ def test_the_linear_loop_is_that_of_the_papers_expressions(case: tuple[Game, Pat
 
 
 def test_constants_of_a_directed_graph_are_those_of_its_matrices() -> None:
-    game = game_from_tables(tomllib.loads(text_of(DIRECTED)), Path("game.toml"))
-    c = loop_constants(game.parameters)
+    c = loop_constants(parameters_of(tomllib.loads(text_of(DIRECTED))))
     other = oracle_of(text_of(DIRECTED))
     N = other.players
     M = np.kron(linear_loop.laplacian(other.adjacency), np.eye(N)) + np.diag(other.adjacency.ravel())

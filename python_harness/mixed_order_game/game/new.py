@@ -12,15 +12,14 @@ import textwrap
 import tomllib
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ..errors import GameError
-from ..theory.game import game_from_tables
 from .gains import Choice, choose_gains
 from .graphs import CommunicationGraph, graphs_of_text
+from .parameters import parameters_of
 
 SMALLEST_PLAYERS = 2
 LARGEST_PLAYERS = 1000
@@ -64,7 +63,7 @@ def new_game(recipe: Recipe) -> str:
     orders = _orders(recipe)
     graph = _graph(recipe)
     draft = tomllib.loads(_text(recipe, orders, graph, PLACEHOLDER))
-    choice = choose_gains(game_from_tables(draft, Path("new game")).parameters)
+    choice = choose_gains(parameters_of(draft))
     return _text(recipe, orders, graph, choice)
 
 

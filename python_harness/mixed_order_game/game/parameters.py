@@ -1,7 +1,8 @@
-"""A game's parameters as arrays: from the FMU's variables and, for the unknown dynamics, its game file."""
+"""A game's parameters as arrays: of its file, and of an FMU whose start values may be changed."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,14 @@ from numpy.typing import NDArray
 
 from ..errors import GameError
 from ..fmu.model import Model, Value
-from .definition import Expressions, initial_estimates, require_coefficients
+from .definition import (
+    Expressions,
+    Table,
+    expressions_of,
+    initial_estimates,
+    initial_references,
+    require_coefficients,
+)
 
 FloatArray = NDArray[np.float64]
 OfPlayers = float | FloatArray
@@ -83,14 +91,74 @@ class GameParameters:
         return np.asarray(linear + np.einsum("ijl,jl->il", self.dynamics_square, x * x))
 
 
+def parameters_of(tables: Table) -> GameParameters:
+    """Parameters of a valid game file whose defaults are applied; a number stands for D equal ones."""
+    players: list[Table] = tables["player"]
+    N, D = len(players), int(tables["dimension"])
+
+    def rows(value_of: Callable[[Table], Any], *shape: int) -> FloatArray:
+        return np.array([np.broadcast_to(value_of(player), shape) for player in players], dtype=np.float64)
+
+    def pairs(part: str, key: str, *shape: int) -> FloatArray:
+        """(N, N, ...) from the pairs [j, value] of each player."""
+        array = np.zeros((N, N, *shape))
+        for i, player in enumerate(players):
+            for j, value in player.get(part, {}).get(key, []):
+                array[i, j - 1] = value
+        return array
+
+    def of_players(table: str, name: str) -> OfPlayers:
+        own = [player.get(table, {}).get(name) for player in players]
+        common = tables.get(table, {}).get(name, math.nan)
+        if all(value is None for value in own):
+            return float(common)
+        return np.array([common if value is None else value for value in own], dtype=np.float64)
+
+    adjacency = np.zeros((N, N))
+    for i, j, *weight in tables["graph"]["edges"]:
+        adjacency[j - 1, i - 1] = weight[0] if weight else 1.0
+        if not tables["graph"].get("directed", False):
+            adjacency[i - 1, j - 1] = adjacency[j - 1, i - 1]
+    return GameParameters(
+        order=np.array([int(player["order"]) for player in players]),
+        k1=of_players("gains", "k1"),
+        k2=of_players("gains", "k2"),
+        k3=of_players("gains", "k3"),
+        k4=of_players("gains", "k4"),
+        delta=of_players("gains", "delta"),
+        epsilon=of_players("gains", "epsilon"),
+        W_max=of_players("rbf", "W_max"),
+        adjacency=adjacency,
+        cost_quadratic=rows(lambda player: player.get("cost", {}).get("quadratic", 0.0)),
+        cost_linear=rows(lambda player: player.get("cost", {}).get("linear", 0.0), D),
+        cost_coupling=pairs("cost", "coupling"),
+        x0=rows(lambda player: player.get("x0", 0.0), D),
+        v0=rows(lambda player: player.get("v0", 0.0), D),
+        z0=rows(initial_references, D),
+        y0=np.array(
+            [
+                [np.broadcast_to(estimate, (D,)) for estimate in initial_estimates(players, i, D)]
+                for i in range(N)
+            ],
+            dtype=np.float64,
+        ),
+        dynamics_linear=pairs("dynamics", "linear", D),
+        dynamics_square=pairs("dynamics", "square", D),
+        disturbance_bound=rows(lambda player: _bound(player.get("disturbance", {})), D),
+        expressions=expressions_of(tables),
+        x_star=None,
+    )
+
+
 def game_parameters(model: Model, changes: Mapping[str, Value] | None = None) -> GameParameters:
     """Parameters of an FMU with changed start values in place of its own.
 
-    An FMU with expose = "outputs" has no y0 variables; their values then come from its game file.
-    Raises VariableError for a change that the FMU would not take.
+    What the FMU has no variables of comes from its game file. Raises VariableError for a change that the FMU
+    would not take.
     """
     N, D = model.players, model.dimension
     values = model.start_values(changes)
+    of_file = parameters_of(model.game)
 
     def array(stem: str, *shape: int) -> FloatArray:
         entries = np.zeros(shape)
@@ -108,9 +176,8 @@ def game_parameters(model: Model, changes: Mapping[str, Value] | None = None) ->
 
     edges = array("a", N, N)
     gain = array("dynamics_gain", N)[:, np.newaxis, np.newaxis]
-    players = model.game["player"]
-    return GameParameters(
-        order=np.array(model.order),
+    return replace(
+        of_file,
         k1=of_players("k1"),
         k2=of_players("k2"),
         k3=of_players("k3"),
@@ -125,13 +192,11 @@ def game_parameters(model: Model, changes: Mapping[str, Value] | None = None) ->
         x0=array("x0", N, D),
         v0=array("v0", N, D),
         z0=array("z0", N, D),
-        y0=array("y0", N, N, D) if model.indexed("y0") else _estimates(players, D),
-        dynamics_linear=gain * _dynamics(players, "linear", D),
-        dynamics_square=gain * _dynamics(players, "square", D),
+        y0=array("y0", N, N, D) if model.indexed("y0") else of_file.y0,
+        dynamics_linear=gain * of_file.dynamics_linear,
+        dynamics_square=gain * of_file.dynamics_square,
         disturbance_bound=np.abs(array("disturbance_bias", N, D))
         + np.abs(array("disturbance_amplitude", N, D)),
-        expressions=model.expressions,
-        x_star=None,
     )
 
 
@@ -142,19 +207,7 @@ def common(value: OfPlayers, name: str, what: str) -> float:
     raise GameError(f"{what} takes one {name} for all players, and those of this game have their own")
 
 
-def _dynamics(players: Sequence[Mapping[str, Any]], kind: str, dimension: int) -> FloatArray:
-    """(N, N, D) from the pairs [j, coefficients] of the game file; one number stands for D equal ones."""
-    coefficients = np.zeros((len(players), len(players), dimension))
-    for i, player in enumerate(players):
-        for j, entries in player.get("dynamics", {}).get(kind, []):
-            coefficients[i, j - 1] = entries
-    return coefficients
-
-
-def _estimates(players: Sequence[Mapping[str, Any]], dimension: int) -> FloatArray:
-    """y0 (N, N, D) of the game file."""
-    estimates = np.zeros((len(players), len(players), dimension))
-    for i in range(len(players)):
-        for j, estimate in enumerate(initial_estimates(players, i, dimension)):
-            estimates[i, j] = estimate
-    return estimates
+def _bound(disturbance: Table) -> FloatArray:
+    """|bias| + |amplitude|, at least max_t |d_il(t)| of a player."""
+    bias, amplitude = (np.abs(disturbance.get(key, 0.0)) for key in ("bias", "amplitude"))
+    return np.asarray(bias + amplitude)

@@ -2,19 +2,20 @@
 
 import math
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
+from dataclasses import replace
 from pathlib import Path
 
 from ..arguments import number_argument
 from ..errors import BuildError, GameError
-from ..files.reading import ReadError, expect_file, read_text, suffix_of, toml_of
 from ..files.temporary import temporary_folder
-from ..fmu.build import build_fmu, cached_fmu, source_of
+from ..fmu.build import build_fmu, fmu_of, source_of
 from ..fmu.model import Value, read_model
-from ..game.definition import expressions_of, has_expressions, with_defaults
+from ..game.definition import has_expressions
+from ..game.parts import toml_of_game
 from .analyst import Analyst, Progress
 from .findings import Analysis
-from .game import AnalysedGame, game_from_tables, read_game, toml_text, without_square
+from .game import read_game, without_square
 from .local_analysis import local_analysis
 
 
@@ -43,47 +44,27 @@ def analyse(
     if not (math.isfinite(radius) and radius > 0.0):
         raise GameError(f"radius = {radius:g} is not positive")
     source = source_of(game)
-    expression = _expression_in(source)
+    file = fmu_of(source)
+    expression = has_expressions(read_model(file).expressions)
     if expression:
         if not square:
             raise GameError(f"{source}: only coefficients have a square term to remove; {expression}")
-        file = source if suffix_of(source) == ".fmu" else cached_fmu(source)
         return local_analysis(file, source, changes or {})
-    with _opened(source, changes, simulation=simulation, square=square) as (analysed, fmu):
-        return Analyst(analysed, fmu, changes or {}, radius, progress).analysis(source)
-
-
-def _expression_in(path: Path) -> str | None:
-    """Whose cost, dynamics or disturbance has an expression; None also for files that are no games."""
-    if suffix_of(path) == ".fmu":
-        return has_expressions(read_model(path).expressions)
-    expect_file(path, "game file", GameError)
-    try:
-        return has_expressions(expressions_of(with_defaults(toml_of(read_text(path)))))
-    except (ReadError, KeyError, TypeError, AttributeError):  # read_game tells what is wrong with it
-        return None
+    with nullcontext(file) if square else _without_square(file) as file:
+        analyst = Analyst(
+            replace(read_game(file, changes), path=source),
+            file if simulation else None,
+            changes or {},
+            radius,
+            progress,
+        )
+        return analyst.analysis(source)
 
 
 @contextmanager
-def _opened(
-    path: Path, changes: Mapping[str, Value] | None, *, simulation: bool, square: bool
-) -> Iterator[tuple[AnalysedGame, Path | None]]:
-    """The game and, where one is needed, its FMU."""
-    needs_fmu = simulation or bool(changes)
-    if square:
-        if suffix_of(path) == ".fmu" or not needs_fmu:
-            yield read_game(path, changes), path if simulation else None
-            return
-        read_game(path)
-        fmu = cached_fmu(path)
-        yield read_game(fmu, changes), fmu if simulation else None
-        return
-    tables = without_square(read_game(path).tables)
-    if not needs_fmu:
-        yield game_from_tables(tables, path), None
-        return
+def _without_square(fmu: Path) -> Iterator[Path]:
+    """The FMU of the same game with every square term of the unknown dynamics removed."""
     with temporary_folder(BuildError) as folder:
         derived = folder / "game.toml"
-        derived.write_text(toml_text(tables), encoding="utf-8")
-        fmu = build_fmu(derived, derived.with_suffix(".fmu"))
-        yield read_game(fmu, changes), fmu if simulation else None
+        derived.write_text(toml_of_game(without_square(read_game(fmu).tables)), encoding="utf-8")
+        yield build_fmu(derived, derived.with_suffix(".fmu"))
