@@ -64,7 +64,7 @@ def _paired(result: Results) -> list[str]:
         )
     difference = result["core_at_1e-13_against_reference"]
     return [
-        "### The paper's case at equal true error",
+        "## The paper's case at equal true error",
         "",
         "200 outputs over 20 s. Each peer at rtol 1e-6; the core at the loosest rtol that gives no worse "
         "largest error of x (and whose neighbour in the grid of ten per decade gives none either). CPU"
@@ -102,7 +102,7 @@ def _precision(result: Results) -> list[str]:
         for row in curves["this core"]
     ]
     return [
-        "### Work and precision",
+        "## Work and precision",
         "",
         "CPU milliseconds / largest error of x, over rtol (the absolute tolerance is 0.01 rtol).",
         "",
@@ -138,7 +138,7 @@ def _scaling(result: Results) -> list[str]:
     complete, klu = result["complete"], result["klu"]
     own, told = klu["klu"], klu["klu-ordered"]
     return [
-        "### Scaling",
+        "## Scaling",
         "",
         "The scaling family, 100 outputs over 10 s, rtol 1e-6. CPU milliseconds, medians; the ratio to N = 20"
         " is that of runs next to each other; memory is that of the whole process at its peak.",
@@ -177,7 +177,7 @@ def _overhead(result: Results) -> list[str]:
             ]
         )
     return [
-        "### What the FMI layer costs",
+        "## What the FMI layer costs",
         "",
         f"The paper's case in {result['steps']} calls of fmi2DoStep from C++ against the bare core doing the"
         " same steps, interpolations and outputs, rtol 1e-6; CPU milliseconds per run, medians of pairs.",
@@ -201,7 +201,7 @@ def _microbench(result: Results) -> list[str]:
         rows.append([part, game, f"{1e6 * row['seconds']:.3g}", per_state, bandwidth, arithmetic])
     run = result["paper_run"]
     return [
-        "### Parts",
+        "## Parts",
         "",
         "Bytes are the least traffic, what must be read and written once; operations are counted for the"
         " right-hand side only.",
@@ -222,7 +222,7 @@ def _machine(results: Results) -> list[str]:
     loads = [load for result in results.values() for load in result["load"]]
     versions = ", ".join(f"{name} {number}" for name, number in first["versions"].items())
     return [
-        "### Machine",
+        "## Machine",
         "",
         f"{first['processor']}, {first['cores']} cores, {first['memory_gb']} GB, {first['system']};"
         f" {first['compiler']}; Python {first['python']}, {versions}."
