@@ -9,6 +9,10 @@ The names stand in __init__.pyi; each is imported when it is first used. The fig
 mixed_order_game.results.plot, the command is mog.
 """
 
+import logging
+
 import lazy_loader
+
+logging.getLogger(__name__).addHandler(logging.NullHandler())
 
 __getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

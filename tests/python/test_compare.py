@@ -16,7 +16,6 @@ from mixed_order_game.studies.compare import (
     compare_results,
     load_results,
 )
-from mixed_order_game.studies.sampler import Settings
 
 
 @pytest.fixture(scope="module")
@@ -89,4 +88,4 @@ def test_what_cannot_be_compared(fmu: Path, compared: Comparison) -> None:
     with pytest.raises(CompareError, match="two runs are called 'without phi'"):
         compare(fmu, {"without phi": {}})
     with pytest.raises(VariableError, match="k9"):
-        compare(fmu, {"a": {"k9": 1.0}}, settings=Settings(stop_time=0.1))
+        compare(fmu, {"a": {"k9": 1.0}}, stop_time=0.1)

@@ -5,16 +5,13 @@ from typing import Annotated
 
 import typer
 
-from .options import GameArgument, settings_of
+from .options import GameArgument, JsonOption, SettingsOption, settings_of
 from .progress import step_named
 
 
 def analyse(
     game: GameArgument = None,
-    settings: Annotated[
-        list[str] | None,
-        typer.Option("--set", metavar="NAME=VALUE", help="Start value of a parameter; repeatable."),
-    ] = None,
+    settings: SettingsOption = None,
     simulation: Annotated[
         bool, typer.Option("--simulation/--no-simulation", help="Compare the bounds with runs of the FMU.")
     ] = True,
@@ -28,7 +25,7 @@ def analyse(
     tables: Annotated[
         bool, typer.Option("--tables", help="Print every figure and hypothesis after the verdicts.")
     ] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Tell whether the gains suit the graph: thresholds of the theorems, exact spectrum, guaranteed radius.
 
@@ -44,7 +41,7 @@ def analyse(
     from ..theory.analysis import analyse as run_analysis
     from .analysis_tables import print_analysis
 
-    with step_named() as show:
+    with step_named("analysing") as show:
         found = run_analysis(
             game,
             changes=settings_of(settings or []),

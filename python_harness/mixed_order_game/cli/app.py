@@ -21,6 +21,7 @@ from .compare import compare
 from .demo import demo
 from .info import info
 from .new import new
+from .panels import grouped
 from .plot import plot
 from .report import report
 from .run import run
@@ -29,6 +30,7 @@ from .ssp import ssp
 from .sweep import sweep
 from .tune import tune
 from .validate import validate
+from .verbosity import with_verbosity
 
 
 class ErrorsAsSentences(typer.core.TyperGroup):
@@ -78,10 +80,16 @@ def root(
     """
 
 
-for command in (
-    build, ssp, info, run, validate, plot, demo, analyse, new, check, schema, report, compare, sweep, tune,
-):  # fmt: skip
-    app.command()(command)
+COMMANDS = {
+    "Run and show": (demo, run, plot, report),
+    "Judge": (validate, analyse, compare),
+    "Many runs": (sweep, tune),
+    "Games": (new, check, schema, info),
+    "FMUs": (build, ssp),
+}
+for heading, commands in COMMANDS.items():
+    for command in commands:
+        app.command(rich_help_panel=heading)(with_verbosity(grouped(command)))
 
 
 def main() -> None:

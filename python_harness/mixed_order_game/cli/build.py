@@ -5,17 +5,12 @@ from typing import Annotated
 
 import typer
 
-from .options import ForceOption, output_option, players_of_text
+from .options import ForceOption, GameFileArgument, output_option, players_of_text
+from .verbosity import note
 
 
 def build(
-    game: Annotated[
-        Path | None,
-        typer.Argument(
-            help="A game file (.toml) or a game of the package by name; the paper's example when left out.",
-            show_default=False,
-        ),
-    ] = None,
+    game: GameFileArgument = None,
     output: Annotated[Path, typer.Option("--output", "-o", help="The FMU to write.")] = Path(
         "MixedOrderGame.fmu"
     ),
@@ -58,5 +53,5 @@ def build(
             source, players_of_text(player, "--player"), output, arm_linux=arm_linux, force=force
         )
     typer.echo(made)
-    for note in notes_of_parts(made):
-        typer.echo(note, err=True)
+    for told in notes_of_parts(made):
+        note(told)

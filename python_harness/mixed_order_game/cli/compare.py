@@ -1,14 +1,15 @@
 """The command `mog compare`: parses options and prints."""
 
 import json
-from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from .completion import complete_source
 from .options import (
     ForceOption,
+    JsonOption,
     SettingsOption,
     SettleTimeOption,
     StepOption,
@@ -19,7 +20,7 @@ from .options import (
 )
 
 if TYPE_CHECKING:
-    from ..fmu.model import Model, Value
+    from ..fmu.model import Value
     from ..studies.compare import Comparison
 
 
@@ -29,6 +30,7 @@ def compare(
         typer.Argument(
             help="FMUs (.fmu), game files (.toml) and results (.parquet, .csv); default the paper's example.",
             show_default=False,
+            autocompletion=complete_source,
         ),
     ] = None,
     variants: Annotated[
@@ -57,7 +59,7 @@ def compare(
         Path | None, typer.Option(help="Draw the errors over time (.pdf, .svg, .png).", show_default=False)
     ] = None,
     force: ForceOption = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+    as_json: JsonOption = False,
 ) -> None:
     r"""Set runs side by side: settling time, overshoot, control energy, final error, events.
 
@@ -72,46 +74,28 @@ def compare(
     mog compare first.parquet second.parquet --json
     """
     from ..files.writing import FIGURE, RESULT
-    from ..fmu.build import SOURCE_OR_RESULT, fmu_of
-    from ..fmu.model import read_model
-    from ..studies.compare import Comparison, compare_results, load_results
     from ..studies.compare import compare as run_variants
-    from ..studies.sampler import Settings
+    from ..studies.compare import load_results
 
     fixed = settings_of(settings or [])
     wanted = dict(_variant(text) for text in variants or [])
-    games: list[Path | None] = [path for path in sources or [] if not RESULT.takes(path)]
     files = [path for path in sources or [] if RESULT.takes(path)]
-    if not files and not games:
-        games = [None]
-    if not games and (fixed or wanted):
+    if sources and len(files) == len(sources) and (fixed or wanted):
         raise typer.BadParameter("results are not run again", param_hint="--variant, --set")
-
     if figure is not None:
         output_option(figure, FIGURE, inputs=sources or [], force=force, hint="--figure")
-    models = [read_model(fmu_of(game, SOURCE_OR_RESULT)) for game in games]
-    results = load_results(files, [] if figure is None else ["nash_error"])
-    _judge(models, [{**fixed, **values} for values in wanted.values()])
-
-    runs = list(compare_results(results, band=band, settle_time=settle_time).runs)
-    for game, model in zip(games, models, strict=True):
-        first = next((run.metrics for run in runs if run.metrics is not None), None)
-        comparison = run_variants(
-            model.path,
-            wanted,
-            start_values=fixed,
-            baselines=baselines,
-            settings=Settings(
-                stop_time=model.stop_time if stop_time is None else stop_time,
-                step=model.step if step is None else step,
-                tolerance=model.tolerance if tolerance is None else tolerance,
-                settle_time=settle_time,
-                band=band if first is None else first.band,
-            ),
-        )
-        prefix = "" if game is None or len(games) + len(files) == 1 else f"{game.stem}: "
-        runs += [run.renamed(prefix + run.label) for run in comparison.runs]
-    found = Comparison(tuple(runs))
+        load_results(files, ["nash_error"])  # which may be missing, before any run
+    found = run_variants(
+        sources or None,
+        wanted,
+        start_values=fixed,
+        baselines=baselines,
+        stop_time=stop_time,
+        step=step,
+        tolerance=tolerance,
+        settle_time=settle_time,
+        band=band,
+    )
     if as_json:
         typer.echo(json.dumps(found.as_json(), indent=2))
     else:
@@ -129,13 +113,6 @@ def _variant(text: str) -> "tuple[str, dict[str, Value]]":
     if not (label.strip() and separator):
         raise typer.BadParameter(f"LABEL:NAME=VALUE,... expected, not {text!r}", param_hint="--variant")
     return label.strip(), settings_of(split_names(values), "--variant")
-
-
-def _judge(models: Sequence["Model"], values: Sequence[Mapping[str, "Value"]]) -> None:
-    """Raises VariableError for values that one of the games does not take, before any is run."""
-    for model in models:
-        for each in values:
-            model.start_values(each)
 
 
 def _print(found: "Comparison") -> None:

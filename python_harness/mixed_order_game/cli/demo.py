@@ -5,7 +5,8 @@ from typing import Annotated
 
 import typer
 
-from .options import FigureFormat, ForceOption
+from .completion import complete_game
+from .options import FigureFormat, ForceOption, JsonOption
 from .progress import progress_by_name
 from .validate import show_validation
 
@@ -16,12 +17,17 @@ def demo(
     ),
     fmu: Annotated[
         Path | None,
-        typer.Option(help="The FMU or game to use; the paper's example when left out.", show_default=False),
+        typer.Option(
+            help="The FMU or game to use; the paper's example when left out.",
+            show_default=False,
+            autocompletion=complete_game,
+        ),
     ] = None,
     file_format: Annotated[
         FigureFormat, typer.Option("--format", case_sensitive=False, help="File format.")
     ] = FigureFormat.PNG,
     force: ForceOption = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Simulate the paper's example, judge each claim, print the verdict and write results and figures.
 
@@ -34,5 +40,5 @@ def demo(
     with progress_by_name() as show:
         done = demonstrate(path, output, suffix=f".{file_format.value}", force=force, progress=show)
     for file in done.files:
-        typer.echo(file)
-    show_validation(done.validation, as_json=False, strict=False)
+        typer.echo(file, err=as_json)
+    show_validation(done.validation, as_json=as_json, strict=False)

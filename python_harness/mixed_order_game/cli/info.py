@@ -5,13 +5,13 @@ from typing import Annotated
 
 import typer
 
-from .options import GameArgument
+from .options import GameArgument, JsonOption
 
 
 def info(
     game: GameArgument = None,
     variables: Annotated[bool, typer.Option("--variables", help="List every variable.")] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Show a game: sizes, graph, gains and who chose them, variables, capabilities.
 

@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from .completion import complete_graphs
 from .options import output_option
 
 
@@ -19,7 +20,8 @@ def new(
         str,
         typer.Option(
             help="Communication graph: ring, path, star, wheel, complete, tree, random:P, regular:DEGREE, "
-            "small-world:K:P, scale-free:M, geometric:RADIUS, or edges such as 1-2,2-3:0.5 (weight 0.5)."
+            "small-world:K:P, scale-free:M, geometric:RADIUS, or edges such as 1-2,2-3:0.5 (weight 0.5).",
+            autocompletion=complete_graphs,
         ),
     ] = "ring",
     seed: Annotated[int, typer.Option(help="Of everything random.")] = 0,

@@ -9,6 +9,7 @@ import typer
 
 from ..files.writing import Kind, check_output
 from ..names import split_names
+from .completion import complete_game, complete_game_file, complete_setting
 
 if TYPE_CHECKING:
     from ..fmu.model import Model, Value
@@ -23,12 +24,27 @@ GameArgument = Annotated[
         help="An FMU (.fmu), a game file (.toml) or a game of the package by name; "
         "the paper's example when left out.",
         show_default=False,
+        autocompletion=complete_game,
+    ),
+]
+
+GameFileArgument = Annotated[
+    Path | None,
+    typer.Argument(
+        help="A game file (.toml) or a game of the package by name; the paper's example when left out.",
+        show_default=False,
+        autocompletion=complete_game_file,
     ),
 ]
 
 SettingsOption = Annotated[
     list[str] | None,
-    typer.Option("--set", metavar="NAME=VALUE", help="Start value of all runs; repeatable."),
+    typer.Option(
+        "--set",
+        metavar="NAME=VALUE",
+        help="Start value of a parameter or input, in all runs; repeatable.",
+        autocompletion=complete_setting,
+    ),
 ]
 
 StopTimeOption = Annotated[float | None, typer.Option(help="End of every run in s.", show_default="FMU's")]
@@ -48,6 +64,8 @@ BandOption = Annotated[
     float | None,
     typer.Option(help="Largest |x - x*| that counts as settled.", show_default="2 % of the initial one"),
 ]
+
+JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 
 ForceOption = Annotated[bool, typer.Option("--force", help="Replace a file of another kind.")]
 

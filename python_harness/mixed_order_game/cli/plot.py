@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from .completion import complete_source
 from .options import FigureFormat, ForceOption, output_option
 
 
@@ -23,6 +24,7 @@ def plot(
         typer.Argument(
             help="A result (.parquet, .csv), or what run takes; the paper's example when left out.",
             show_default=False,
+            autocompletion=complete_source,
         ),
     ] = None,
     output: Annotated[Path, typer.Option("--output", "-o", help="Folder for the figures.")] = Path("figures"),

@@ -7,6 +7,8 @@ from contextlib import contextmanager
 
 import typer
 
+from .verbosity import is_quiet
+
 LINE_EVERY = 10.0
 """Time in s between lines of progress when stderr is not a terminal."""
 
@@ -18,6 +20,9 @@ def counted_progress(what: str) -> Iterator[Callable[[int, int], None]]:
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
     console = Console(stderr=True)
+    if is_quiet():
+        yield lambda _done, _total: None
+        return
     if not console.is_terminal:
         yield _lines(what)
         return
@@ -57,7 +62,9 @@ def progress_by_name() -> Iterator[Callable[[str, float], None]]:
 
     columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
     console = Console(stderr=True)
-    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bars:
+    with Progress(
+        *columns, console=console, transient=True, disable=is_quiet() or not console.is_terminal
+    ) as bars:
         tasks: dict[str, TaskID] = {}
 
         def show(name: str, part: float) -> None:
@@ -69,13 +76,13 @@ def progress_by_name() -> Iterator[Callable[[str, float], None]]:
 
 
 @contextmanager
-def step_named() -> Iterator[Callable[[str, float], None]]:
+def step_named(what: str) -> Iterator[Callable[[str, float], None]]:
     """A spinner on stderr that names the step; nothing when stderr is not a terminal."""
     from rich.console import Console
 
     console = Console(stderr=True)
-    if not console.is_terminal:
+    if is_quiet() or not console.is_terminal:
         yield lambda _name, _part: None
         return
-    with console.status("analysing", spinner="line") as status:
-        yield lambda name, _part: status.update(name)
+    with console.status(what, spinner="line") as status:
+        yield lambda name, part: status.update(f"{name} {part:.0%}" if part else name)

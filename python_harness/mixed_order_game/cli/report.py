@@ -1,11 +1,13 @@
 """The command `mog report`: parses options and prints."""
 
+import json
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from .options import ForceOption, output_option, settings_of
+from .completion import complete_source
+from .options import ForceOption, JsonOption, SettingsOption, output_option, settings_of
 
 
 def report(
@@ -15,15 +17,13 @@ def report(
             help="An FMU, a game file, a game of the package by name, or a result (.parquet, .csv); "
             "the paper's example when left out.",
             show_default=False,
+            autocompletion=complete_source,
         ),
     ] = None,
     output: Annotated[Path, typer.Option("--output", "-o", help="The page to write (.html).")] = Path(
         "report.html"
     ),
-    settings: Annotated[
-        list[str] | None,
-        typer.Option("--set", metavar="NAME=VALUE", help="Start value of a parameter; repeatable."),
-    ] = None,
+    settings: SettingsOption = None,
     stop_time: Annotated[
         float | None, typer.Option(help="End of the run in s.", show_default="FMU's")
     ] = None,
@@ -34,6 +34,7 @@ def report(
         ),
     ] = True,
     force: ForceOption = False,
+    as_json: JsonOption = False,
 ) -> None:
     r"""Write one HTML page about a game or a run: interactive figures, claims, parameters, provenance.
 
@@ -61,8 +62,12 @@ def report(
         stop_time=stop_time,
         force=force,
     )
-    typer.echo(done.path)
     validation = done.evidence.validation
+    if as_json:
+        judged = None if validation is None else validation.as_json()
+        typer.echo(json.dumps({"page": str(done.path), "validation": judged}, indent=2))
+    else:
+        typer.echo(done.path)
     problem = "" if validation is None else validation.problem()
     if problem:
         typer.echo(f"mog: {problem}", err=True)

@@ -1,20 +1,28 @@
 """The command `mog run`: parses options and prints."""
 
+import json
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from .options import ForceOption, GameArgument, ToleranceOption, names_option, output_option, settings_of
+from .completion import complete_variables
+from .options import (
+    ForceOption,
+    GameArgument,
+    JsonOption,
+    SettingsOption,
+    ToleranceOption,
+    names_option,
+    output_option,
+    settings_of,
+)
 from .progress import progress_by_name
 
 
 def run(
     game: GameArgument = None,
-    settings: Annotated[
-        list[str] | None,
-        typer.Option("--set", metavar="NAME=VALUE", help="Start value of a parameter or input; repeatable."),
-    ] = None,
+    settings: SettingsOption = None,
     stop_time: Annotated[
         float | None, typer.Option(help="End of the run in s.", show_default="start plus the FMU's")
     ] = None,
@@ -32,6 +40,7 @@ def run(
         list[str] | None,
         typer.Option(
             metavar="NAMES",
+            autocompletion=complete_variables,
             help="Variables to record, separated by commas; x stands for every x\\[i,l]; repeatable. "
             "All outputs and locals but y, W and time derivatives when left out.",
         ),
@@ -48,6 +57,7 @@ def run(
         bool, typer.Option("--linear-disturbance", help="Straight between its rows, not held.")
     ] = False,
     force: ForceOption = False,
+    as_json: JsonOption = False,
 ) -> None:
     r"""Run a game through fmpy and write or summarize the result.
 
@@ -62,7 +72,7 @@ def run(
     from ..files.writing import RESULT
     from ..fmu.run import Simulator
     from ..fmu.schedule import read_disturbance, read_graph_schedule
-    from .tables import print_result
+    from .tables import print_result, result_data
 
     values = settings_of(settings or [])
     names = names_option(variables, "--variables") if variables else None
@@ -89,6 +99,8 @@ def run(
             progress=lambda time: show("simulating", (time - start_time) / span),
         )
     if output is not None:
-        typer.echo(result.save(output, force=force))
-    else:
+        typer.echo(result.save(output, force=force), err=as_json)
+    if as_json:
+        typer.echo(json.dumps(result_data(result), indent=2))
+    elif output is None:
         print_result(result)

@@ -5,17 +5,11 @@ from typing import Annotated
 
 import typer
 
-from .options import ForceOption, output_option, players_of_text
+from .options import ForceOption, GameFileArgument, output_option, players_of_text
 
 
 def ssp(
-    game: Annotated[
-        Path | None,
-        typer.Argument(
-            help="A game file (.toml) or a game of the package by name; the paper's example when left out.",
-            show_default=False,
-        ),
-    ] = None,
+    game: GameFileArgument = None,
     output: Annotated[Path, typer.Option("--output", "-o", help="The system structure to write.")] = Path(
         "game.ssp"
     ),

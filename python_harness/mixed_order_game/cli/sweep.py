@@ -9,10 +9,12 @@ import typer
 from ..game.graph_kinds import GRAPHS_HELP
 from ..interrupts import INTERRUPTED
 from ..studies.sampling import Sampling
+from .completion import complete_graphs
 from .options import (
     BandOption,
     ForceOption,
     GameArgument,
+    JsonOption,
     SettingsOption,
     SettleTimeOption,
     StepOption,
@@ -66,7 +68,10 @@ def sweep(
         Sampling, typer.Option(case_sensitive=False, help="How points are drawn; Sobol wants a power of two.")
     ] = Sampling.LATIN_HYPERCUBE,
     graphs: Annotated[
-        list[str] | None, typer.Option(metavar="KIND", help=f"Graphs: {GRAPHS_HELP}; repeatable.")
+        list[str] | None,
+        typer.Option(
+            metavar="KIND", help=f"Graphs: {GRAPHS_HELP}; repeatable.", autocompletion=complete_graphs
+        ),
     ] = None,
     initial_states: Annotated[int, typer.Option(min=0, help="Random initial actions x0 to run from.")] = 0,
     initial_actions: Annotated[
@@ -107,7 +112,7 @@ def sweep(
         ),
     ] = None,
     force: ForceOption = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+    as_json: JsonOption = False,
 ) -> None:
     r"""Run a game many times: over grids, samples, graphs and random initial states, on all cores.
 

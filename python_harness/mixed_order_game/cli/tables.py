@@ -142,6 +142,37 @@ def print_result(result: Result) -> None:
     show(table, console)
 
 
+def result_data(result: Result) -> dict[str, Any]:
+    """The same as plain values for json.dumps; None where a player has no velocity or nothing is known."""
+    data: dict[str, Any] = {
+        "title": result.title,
+        "start_time": float(result.time[0]),
+        "stop_time": float(result.time[-1]),
+        "samples": len(result.time),
+        "signals": len(result.columns),
+        "changed": dict(result.changed),
+        "messages": list(result.messages),
+    }
+    try:
+        x, v, x_star = result.x[-1], result.v[-1], result.x_star
+    except ResultError:
+        return data
+    return {
+        **data,
+        "metrics": result.metrics.as_json(),
+        "players": [
+            {
+                "player": i + 1,
+                "x": x[i].tolist(),
+                "v": None if np.isnan(v[i]).all() else v[i].tolist(),
+                "x_star": x_star[i].tolist(),
+                "distance": float(np.linalg.norm(x[i] - x_star[i])),
+            }
+            for i in range(result.players)
+        ],
+    }
+
+
 VERDICT_STYLES = {
     Verdict.HOLDS: "green",
     Verdict.FAILS: "bold red",

@@ -7,7 +7,17 @@ import typer
 
 from ..game.graph_kinds import GRAPHS_HELP
 from ..interrupts import INTERRUPTED
-from .options import BandOption, GameArgument, SettingsOption, graphs_option, pairs_of, settings_of
+from .completion import complete_graphs
+from .options import (
+    BandOption,
+    GameArgument,
+    JsonOption,
+    SettingsOption,
+    graphs_option,
+    pairs_of,
+    settings_of,
+)
+from .progress import step_named
 
 if TYPE_CHECKING:
     from ..studies.tune import Tuned
@@ -22,7 +32,11 @@ def tune(
     ],
     graphs: Annotated[
         list[str] | None,
-        typer.Option(metavar="KIND", help=f"Tune for all of these graphs: {GRAPHS_HELP}; repeatable."),
+        typer.Option(
+            metavar="KIND",
+            help=f"Tune for all of these graphs: {GRAPHS_HELP}; repeatable.",
+            autocompletion=complete_graphs,
+        ),
     ] = None,
     gains: Annotated[
         str,
@@ -48,7 +62,7 @@ def tune(
         int | None,
         typer.Option("--jobs", "-j", min=1, help="Processes for many graphs.", show_default="one a core"),
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+    as_json: JsonOption = False,
 ) -> None:
     r"""Find gains that settle in a wished time with little control energy; exit with 1 if none do.
 
@@ -61,8 +75,6 @@ def tune(
 
     mog tune my_game.toml --settling-time 1 --graphs all --gains k1,k2,k3,k4,delta --range k3=10:200
     """
-    from rich.console import Console
-
     from ..fmu.build import fmu_of
     from ..fmu.model import read_model
     from ..names import split_names
@@ -73,8 +85,7 @@ def tune(
     boxes = pairs_of(ranges or [], range_of_text, "--range")
     fmu = fmu_of(game)
     chosen = graphs_option(graphs or [], read_model(fmu), seed) or None
-    console = Console(stderr=True)
-    with console.status("tuning", spinner="line") as status:
+    with step_named("tuning") as show:
         found = search(
             fmu,
             settling_time,
@@ -87,7 +98,7 @@ def tune(
             stop_time=stop_time,
             seed=seed,
             jobs=jobs,
-            progress=lambda name, part: status.update(f"{name} {part:.0%}"),
+            progress=show,
         )
     if as_json:
         typer.echo(json.dumps(found.as_json(), indent=2))

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .options import GameArgument
+from .options import GameArgument, JsonOption
 from .progress import progress_by_name
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ def validate(
         typer.Option(help="Largest |x - x*| wanted once settled: one more claim.", show_default=False),
     ] = None,
     strict: Annotated[bool, typer.Option("--strict", help="Exit with 1 unless every claim holds.")] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Judge the paper's claims on a game; exit with 1 if one fails.
 

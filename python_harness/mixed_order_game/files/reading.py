@@ -11,14 +11,14 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
-from ..errors import MixedOrderGameError, reason
+from ..errors import MixedOrderGameError, missing, reason
 
 BYTE_ORDER_MARKS_OF_UTF_16 = (b"\xff\xfe", b"\xfe\xff")
 SEPARATOR = re.compile(r'(?:sep=|"?time"? *)([;\t|])')
 """At the beginning of a table that is not separated by commas."""
 
 
-class ReadError(MixedOrderGameError):
+class ReadError(MixedOrderGameError, ValueError):
     """A file that is not what it is read as; the text tells what stands there, not the file's name."""
 
 
@@ -35,7 +35,7 @@ def expect_file(path: Path, what: str, error: type[MixedOrderGameError]) -> None
             path.open("rb").close()
             return
     except (FileNotFoundError, NotADirectoryError, ValueError):  # ValueError: no file can have this name
-        raise error(f"there is no {what} {path}") from None
+        raise missing(error)(f"there is no {what} {path}") from None
     except OSError as found:
         raise error(f"{path} cannot be read: {reason(found)}") from found
     kind = "a folder" if stat.S_ISDIR(mode) else "not a regular file"

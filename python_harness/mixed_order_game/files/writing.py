@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Any
 
-from ..errors import ResultError, reason
+from ..errors import ExistingFileError, ResultError, reason
 from ..extras import need
 from ..names import parse_name
 from .reading import suffix_of
@@ -147,10 +147,10 @@ def _check_existing(path: Path, target: Path, kind: Kind, *, force: bool) -> Non
     if force or target.stat().st_size == 0:
         return
     if kind.known is None:
-        raise ResultError(f"{path} exists: name another file or add --force (in Python force=True)")
+        raise ExistingFileError(f"{path} exists: name another file or add --force (in Python force=True)")
     if not _known(target, kind.known):
         told = f"{path} exists and is not {kind.name}"
-        raise ResultError(f"{told}: name another file or add --force (in Python force=True)")
+        raise ExistingFileError(f"{told}: name another file or add --force (in Python force=True)")
 
 
 def _known(path: Path, known: Callable[[Path], bool]) -> bool:

@@ -6,6 +6,7 @@ licenses/ and model.png, for this machine's platform or for all of them; in its 
 """
 
 import hashlib
+import logging
 import os
 import platform
 import shutil
@@ -16,12 +17,15 @@ import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import Protocol, runtime_checkable
 
-from ..errors import BuildError, GameError, ResultError, reason
+from ..errors import BuildError, GameError, MissingGameError, ResultError, reason
 from ..files.reading import expect_file, suffix_of
 from ..files.temporary import HINT, explained, folder_of_process, temporary_folder
 from ..files.writing import FMU, check_folder, check_output, write_file, write_whole
 from .packaging import PackagingError, write_fmu
+
+logger = logging.getLogger(__name__)
 
 DEFAULT_GAME = "five_vehicles"
 """The paper's example."""
@@ -34,16 +38,54 @@ TOOL = "mixed-order-game-description"
 ARM_LINUX = "aarch64-linux"
 
 
+@runtime_checkable
+class GameObject(Protocol):
+    """A game that is no file, such as a mixed_order_game.Game: it makes its own FMU."""
+
+    def build(self) -> Path:
+        """Its FMU."""
+
+
+GameSource = Path | str | GameObject | None
+"""An FMU or a game: a file, a game of the package by its name, an object, None for the paper's example."""
+
+
 def build_fmu(
     game: Path | str, output: Path | str, *, arm_linux: bool | None = None, force: bool = False
 ) -> Path:
-    """Make the FMU of a game file (TOML), or of a game of the package by its name; return `output`.
+    """Make the FMU of a game. No compiler is needed; equal inputs give equal bytes.
 
-    It holds the libraries of all platforms that the package carries. With `arm_linux`, the default on such a
-    machine, it is for 64-bit Arm Linux alone: its library lies in linux64 too, where most importers look.
-    Equal inputs give equal bytes. Replaces an FMU of a game, with `force` any file but the game. Raises
-    GameError if the file is missing or breaks the definition of a game, BuildError if the installation lacks
-    the compiled parts or the archive cannot be written or does not replace the file.
+    It holds the libraries of all platforms that the package carries.
+
+    Parameters
+    ----------
+    game
+        A game file (.toml) or a game of the package by its name.
+    output
+        The FMU (.fmu). It replaces an FMU of a game.
+    arm_linux
+        Whether it is for 64-bit Arm Linux alone: its library then lies in linux64 too, where most importers
+        look. Default: on such a machine.
+    force
+        Whether any file but the game is replaced.
+
+    Returns
+    -------
+    Path
+        `output`.
+
+    Raises
+    ------
+    GameError
+        If the file is missing (a FileNotFoundError, too) or breaks the definition of a game.
+    BuildError
+        If the installation lacks the compiled parts, or the archive cannot be written or does not replace the
+        file.
+
+    Examples
+    --------
+    >>> mog.build_fmu("rivalling_pairs", "rivals.fmu").name
+    'rivals.fmu'
     """
     game, output = game_file(game), Path(output)
     expect_file(game, "game file", GameError)
@@ -87,19 +129,52 @@ def _archive(game: Path, *, arm_linux: bool | None = None) -> Iterator[Path]:
 
 
 def default_fmu() -> Path:
-    """The FMU of the paper's example, made once and kept in the user's cache folder.
+    """Make the FMU of the paper's example once and keep it in the user's cache folder.
 
-    Raises as build_fmu does.
+    Returns
+    -------
+    Path
+        The FMU.
+
+    Raises
+    ------
+    BuildError
+        As `build_fmu` does.
+
+    Examples
+    --------
+    >>> mog.default_fmu().name
+    'MixedOrderGame.fmu'
     """
     return cached_fmu(default_game())
 
 
 def cached_fmu(game: Path | str) -> Path:
-    """The FMU of a game file, or of a game of the package by its name, kept in the user's cache folder.
+    """Make the FMU of a game once and keep it in the user's cache folder.
 
     The entry's name holds a fingerprint of the game, the compiled parts and the documentation, so that a
     changed file gives a new FMU; a damaged entry is made again. Where the cache cannot be written, the FMU
-    lies in a temporary folder until the process ends. Raises as build_fmu does.
+    lies in a temporary folder until the process ends.
+
+    Parameters
+    ----------
+    game
+        A game file (.toml) or a game of the package by its name.
+
+    Returns
+    -------
+    Path
+        The FMU.
+
+    Raises
+    ------
+    GameError, BuildError
+        As `build_fmu` does.
+
+    Examples
+    --------
+    >>> mog.cached_fmu("five_vehicles") == mog.default_fmu()
+    True
     """
     import platformdirs
 
@@ -123,7 +198,10 @@ def cached_fmu(game: Path | str) -> Path:
 
 def _kept(game: Path, output: Path) -> Path:
     """The FMU of a game at a place of our own. Raises ResultError if it cannot be written there."""
-    if not _intact(output):
+    if _intact(output):
+        logger.debug("the FMU of %s is in the cache: %s", game, output)
+    else:
+        logger.info("making the FMU of %s: %s", game, output)
         check_folder(output.parent)
         with _archive(game) as archive, archive.open("rb") as made:
             write_whole(output, lambda file: shutil.copyfileobj(made, file))
@@ -140,7 +218,23 @@ def _intact(fmu: Path) -> bool:
 
 
 def default_game() -> Path:
-    """Game file of the paper's example. Raises BuildError if the installation lacks it."""
+    """Find the game file of the paper's example.
+
+    Returns
+    -------
+    Path
+        The file.
+
+    Raises
+    ------
+    BuildError
+        If the installation lacks it.
+
+    Examples
+    --------
+    >>> mog.default_game().name
+    'five_vehicles.toml'
+    """
     return shipped_game(DEFAULT_GAME)
 
 
@@ -151,7 +245,9 @@ def shipped_game(name: str) -> Path:
     """
     games = shipped_games()
     if name not in games:
-        raise GameError(f"there is no game {name}; those that come with the package are {', '.join(games)}")
+        raise MissingGameError(
+            f"there is no game {name}; those that come with the package are {', '.join(games)}"
+        )
     return games[name]
 
 
@@ -164,13 +260,17 @@ def shipped_games() -> dict[str, Path]:
     return games
 
 
-def source_of(game: Path | str | None, expected: str = SOURCE) -> Path:
+def source_of(game: GameSource, expected: str = SOURCE) -> Path:
     """The FMU or game file meant: a file, a game of the package by its name, the paper's example for None.
+
+    Of a game object it is its FMU.
 
     Raises GameError, which ends with what is expected, for anything else; whether a file exists is not asked.
     """
     if game is None:
         return default_game()
+    if isinstance(game, GameObject):
+        return game.build()
     path = Path(game)
     if suffix_of(path) in (".fmu", ".toml"):
         return path
@@ -181,7 +281,7 @@ def source_of(game: Path | str | None, expected: str = SOURCE) -> Path:
     return shipped_game(str(path))
 
 
-def game_file(game: Path | str | None) -> Path:
+def game_file(game: GameSource) -> Path:
     """The game file meant, as source_of does. Raises GameError for an FMU as well."""
     path = source_of(game, GAME_FILE)
     if suffix_of(path) == ".fmu":
@@ -189,7 +289,7 @@ def game_file(game: Path | str | None) -> Path:
     return path
 
 
-def fmu_of(game: Path | str | None, expected: str = SOURCE) -> Path:
+def fmu_of(game: GameSource, expected: str = SOURCE) -> Path:
     """The FMU meant, as source_of does; a game is made into one and kept in the cache."""
     path = source_of(game, expected)
     return path if suffix_of(path) == ".fmu" else cached_fmu(path)

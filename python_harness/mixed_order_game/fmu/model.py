@@ -15,11 +15,11 @@ from typing import Any, TypeVar
 import fmpy
 import numpy as np
 
-from ..errors import ModelError, VariableError, reason
+from ..errors import ModelError, UnknownVariableError, VariableError, reason
 from ..files.reading import expect_file, read_text, text_of, toml_of
 from ..game.definition import expressions_of, with_defaults
 from ..names import parse_name
-from .build import default_game, fmu_of
+from .build import GameSource, default_game, fmu_of
 
 MODEL_IDENTIFIER = "MixedOrderGame"
 Value = float | bool
@@ -203,10 +203,10 @@ class Model:
         return [rate for rate in named if rate in self.variables]
 
     @staticmethod
-    def _unknown(name: str, known: Iterable[str]) -> VariableError:
+    def _unknown(name: str, known: Iterable[str]) -> UnknownVariableError:
         near = difflib.get_close_matches(name, dict.fromkeys(known), n=3, cutoff=0.5)
         hint = f"; did you mean {' or '.join(near)}?" if near else ""
-        return VariableError(f"there is no variable {name}{hint}")
+        return UnknownVariableError(f"there is no variable {name}{hint}")
 
     @property
     def edges(self) -> tuple[tuple[int, int, float], ...]:
@@ -296,11 +296,31 @@ def check_value(variable: Variable, value: object, *, during_run: bool = False) 
     return float(value)
 
 
-def read_model(fmu: Path | str | None = None) -> Model:
-    """Read an FMU of this project, or that of a game file or of a game of the package by its name.
+def read_model(fmu: GameSource = None) -> Model:
+    """Read what an FMU says of itself: sizes, parameters, variables, capabilities. Runs nothing.
 
-    None stands for the paper's example. Raises ModelError for a file that is no FMU of this project or cannot
-    be read, GameError and BuildError as cached_fmu does.
+    Parameters
+    ----------
+    fmu
+        An FMU (.fmu), a game file (.toml), a game of the package by its name, a `Game`; the paper's example
+        when left out.
+
+    Returns
+    -------
+    Model
+
+    Raises
+    ------
+    ModelError
+        For a file that is missing (a FileNotFoundError, too) or is no FMU of this project.
+    GameError, BuildError
+        As making the FMU does.
+
+    Examples
+    --------
+    >>> model = mog.read_model("five_vehicles")
+    >>> model.order, model.dimension
+    ((1, 1, 1, 2, 2), 2)
     """
     path = fmu_of(fmu)
     expect_file(path, "FMU", ModelError)

@@ -4,8 +4,10 @@ fmpy.simulate_fmu is not used: a Simulator keeps its instance between runs (rese
 variable, reports progress, sets inputs and tunable parameters on the way and turns the FMU's log into errors.
 """
 
+import logging
 import os
 import shutil
+import time as clock
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from ctypes import c_double, c_int, c_uint
@@ -25,20 +27,24 @@ from fmpy.fmi2 import (
     fmi2CallbackLoggerTYPE,
     fmi2Discard,
     fmi2True,
+    fmi2Warning,
 )
 from numpy.typing import ArrayLike, NDArray
 
 from ..arguments import array_argument, number_argument
-from ..errors import SimulationError
+from ..errors import ExperimentError, SimulationError
 from ..files.temporary import explained, new_folder
 from ..interrupts import noted_signals
 from ..names import split_names
 from ..results.result import Result
 from ..times import in_seconds
 from ..version import package_version
+from .build import GameSource
 from .model import Model, Value, Variable, check_value, read_model
 from .schedule import Disturbance
 from .turn import Turn, in_turn
+
+logger = logging.getLogger(__name__)
 
 Inputs = Disturbance | Callable[[float], ArrayLike] | ArrayLike
 """External disturbance d_ext: rows over time, a function of the time in s giving
@@ -58,7 +64,7 @@ LEFT_OUT = ("y", "W")
 
 
 def run(
-    fmu: Path | str | None = None,
+    game: GameSource = None,
     *,
     start_values: Mapping[str, Value] | None = None,
     stop_time: float | None = None,
@@ -70,8 +76,63 @@ def run(
     changes: Changes | None = None,
     progress: Progress | None = None,
 ) -> Result:
-    """Run an FMU, or a game, once. For several runs of one use Simulator, whose run() this is."""
-    with Simulator(fmu) as simulator:
+    """Run a game once, from start to stop, and sample it.
+
+    For several runs of one game use a `Simulator`, which loads the FMU once.
+
+    Parameters
+    ----------
+    game
+        An FMU (.fmu), a game file (.toml), a game of the package by its name, a `Game`; the paper's example
+        when left out.
+    start_values
+        Parameters and inputs to set first, by name; others keep the FMU's start values. A name without
+        indices stands for all of its kind, `a` for every `a[i,j]`, here, in `changes` and in `outputs`.
+    stop_time
+        End in s; default `start_time` plus the FMU's stop time.
+    start_time
+        Beginning in s; any, Unix time, say: disturbances are functions of it.
+    step
+        Time between samples in s; the last one is shorter if the horizon is not a multiple of it.
+    tolerance
+        Relative tolerance of the integrator, between 0 and 1.
+    outputs
+        Names to record; default all outputs and locals but y, W and the time derivatives. `x_star` is always
+        recorded.
+    inputs
+        External disturbance d_ext: a function of the time in s giving (N, D), or an array (N, D) or (T, N, D)
+        with one row a sample, each held over each communication step at the value of its beginning; or a
+        `schedule.Disturbance`, whose rows act exactly at their times, held or straight between them.
+    changes
+        Tunable parameters and inputs set on the way: time in s -> name -> value, each before the step that
+        begins at its time. A sample at the time of a change is taken before it.
+    progress
+        Called with the time reached, in s, after every step.
+
+    Returns
+    -------
+    Result
+        Signals as arrays, (T, N, D) for actions: time, player, coordinate.
+
+    Raises
+    ------
+    GameError, ModelError
+        For a game or FMU that is missing (a FileNotFoundError, too) or is none.
+    VariableError
+        For a variable that does not exist (a KeyError, too) or does not take its value.
+    SimulationError
+        For whatever the FMU refuses; for times, shapes and tolerances that make no sense it is an
+        `ExperimentError`, a ValueError, too.
+
+    Examples
+    --------
+    >>> result = mog.run("five_vehicles", start_values={"k1": 12.0}, stop_time=2.0)
+    >>> result.x.shape
+    (101, 5, 2)
+    >>> result.largest_error(1.9) < 0.1
+    True
+    """
+    with Simulator(game) as simulator:
         return simulator.run(
             start_values=start_values,
             stop_time=stop_time,
@@ -102,11 +163,11 @@ class Simulator:
     Threads that share one wait for each other; to run at the same time each needs its own.
 
     fmu: a file (.fmu), or a game, of which it is made on first use: a game file (.toml), a game of the
-    package by its name, or None for the paper's example.
+    package by its name, a Game, or None for the paper's example.
     Raises what read_model raises, SimulationError if the FMU cannot be loaded on this machine.
     """
 
-    def __init__(self, fmu: Path | str | None = None) -> None:
+    def __init__(self, fmu: GameSource = None) -> None:
         self.model: Model = read_model(fmu)
         self.model.require_whole()
         self._messages: list[tuple[int, str]] = []
@@ -186,33 +247,53 @@ class Simulator:
         changes: Changes | None = None,
         progress: Progress | None = None,
     ) -> Result:
-        """Run from start_time to stop_time, in s, and sample every step, both ends included.
-
-        start_time: any, Unix time, say; disturbances are functions of it. stop_time: default start_time plus
-            the FMU's stop time.
-        start_values: parameters and inputs to set first, others keep the FMU's start values; a stands for
-            every a[i,j], here, in changes and in outputs.
-        step: communication step in s; the last one is shorter if the horizon is not a multiple of it.
-        tolerance: relative tolerance of the integrator.
-        outputs: names to record; x stands for every x[i,l], der(x) for every der(x[i,l]). Default: all
-            outputs and locals but y, W and the time derivatives. x_star is always recorded.
-        inputs: external disturbance d_ext: a function of the time in s giving (N, D), or an array (N, D), or
-            (T, N, D) with one row a sample, each held over each communication step at the value of its
-            beginning; or a schedule.Disturbance, whose rows act exactly at their times, held or straight
-            between them.
-        changes: tunable parameters and inputs set on the way, each before the step that begins at its time.
-            A sample at the time of a change is taken before it.
+        """Run from start_time to stop_time and sample every step, both ends included.
 
         The times of changes and of a Disturbance's rows become communication points when they lie between two
         samples; samples are taken at the same times as without them.
 
-        Raises VariableError for a variable that does not exist or does not take its value, SimulationError
-        for times, shapes and tolerances that make no sense and for whatever the FMU refuses.
+        Parameters
+        ----------
+        start_values
+            Parameters and inputs to set first, by name; others keep the FMU's start values. A name without
+            indices stands for all of its kind, `a` for every `a[i,j]`, here, in `changes` and in `outputs`.
+        stop_time
+            End in s; default `start_time` plus the FMU's stop time.
+        start_time
+            Beginning in s; any, Unix time, say: disturbances are functions of it.
+        step
+            Time between samples in s; the last one is shorter if the horizon is not a multiple of it.
+        tolerance
+            Relative tolerance of the integrator, between 0 and 1.
+        outputs
+            Names to record; default all outputs and locals but y, W and the time derivatives. `x_star` is
+            always recorded.
+        inputs
+            External disturbance d_ext: a function of the time in s giving (N, D), or an array (N, D) or
+            (T, N, D) with one row a sample, each held over each communication step at the value of its
+            beginning; or a `schedule.Disturbance`, whose rows act exactly at their times, held or straight
+            between them.
+        changes
+            Tunable parameters and inputs set on the way: time in s -> name -> value, each before the step
+            that begins at its time. A sample at the time of a change is taken before it.
+        progress
+            Called with the time reached, in s, after every step.
+
+        Returns
+        -------
+        Result
+
+        Raises
+        ------
+        VariableError
+            For a variable that does not exist or does not take its value.
+        SimulationError
+            For whatever the FMU refuses, and for times, shapes and tolerances that make no sense.
         """
         if stop_time is None:
-            stop_time = number_argument(start_time, "start_time", SimulationError) + self.model.stop_time
+            stop_time = number_argument(start_time, "start_time", ExperimentError) + self.model.stop_time
         start_time, stop_time, step, tolerance = (
-            number_argument(value, name, SimulationError)
+            number_argument(value, name, ExperimentError)
             for name, value in (
                 ("start_time", start_time),
                 ("stop_time", stop_time),
@@ -222,7 +303,7 @@ class Simulator:
         )
         time = _samples(start_time, stop_time, step)
         if not (np.isfinite(tolerance) and 0.0 < tolerance < 1.0):
-            raise SimulationError(f"tolerance = {tolerance:g} is not between 0 and 1")
+            raise ExperimentError(f"tolerance = {tolerance:g} is not between 0 and 1")
         start = self.model.expanded(start_values or {})
         parameters = self.model.start_values(start)
         schedule = _schedule(self.model, changes or {}, time)
@@ -230,6 +311,7 @@ class Simulator:
         if inputs is not None:
             _check_set_once(self.model, [start, *schedule.values()])
         recorder = _Columns(self._recorded(outputs), len(time))
+        begin = clock.perf_counter()
         messages = self._walk(
             time,
             recorder,
@@ -238,6 +320,13 @@ class Simulator:
             schedule=schedule,
             disturbance=disturbance,
             progress=progress,
+        )
+        logger.info(
+            "ran %s from %.15g to %s in %.3g s of computing",
+            self.model.title,
+            start_time,
+            in_seconds(stop_time),
+            clock.perf_counter() - begin,
         )
         return self.result(
             time,
@@ -408,7 +497,9 @@ class Simulator:
         ]
 
     def _log(self, _: object, _name: bytes, status: int, _category: bytes, message: bytes) -> None:
-        self._messages.append((status, message.decode("utf-8", errors="replace")))
+        text = message.decode("utf-8", errors="replace")
+        logger.log(logging.WARNING if status == fmi2Warning else logging.DEBUG, "the FMU says: %s", text)
+        self._messages.append((status, text))
 
     def _said(self) -> str:
         """The last error that the FMU logged; empty if it logged none."""
@@ -506,9 +597,9 @@ class _Function(_Inputs):
         self._function = function
 
     def set(self, slave: Any, time: float) -> None:
-        value = array_argument(self._function(time), f"inputs({time:.15g})", SimulationError)
+        value = array_argument(self._function(time), f"inputs({time:.15g})", ExperimentError)
         if value.shape != self._shape:
-            raise SimulationError(f"inputs({time:.15g}) has the shape {value.shape}, not {self._shape}")
+            raise ExperimentError(f"inputs({time:.15g}) has the shape {value.shape}, not {self._shape}")
         _check_finite(value, f"inputs({time:.15g})")
         self._give(slave, value)
 
@@ -550,9 +641,9 @@ def _disturbance(model: Model, inputs: Inputs | None, samples: NDArray[np.float6
         return _rows_of(model, inputs, samples)
     if callable(inputs):
         return _Function(model, inputs)
-    array = array_argument(inputs, "inputs", SimulationError)
+    array = array_argument(inputs, "inputs", ExperimentError)
     if array.shape not in (shape, (len(samples), *shape)):
-        raise SimulationError(f"inputs has the shape {array.shape}, not {shape} or {(len(samples), *shape)}")
+        raise ExperimentError(f"inputs has the shape {array.shape}, not {shape} or {(len(samples), *shape)}")
     _check_finite(array, "inputs")
     return _Rows(model, samples.tolist(), np.broadcast_to(array, (len(samples), *shape)))
 
@@ -561,7 +652,7 @@ def _rows_of(model: Model, inputs: Disturbance, samples: NDArray[np.float64]) ->
     """What is in force at the start, and every row between start and stop."""
     shape = (model.players, model.dimension)
     if inputs.values.shape[1:] != shape:
-        raise SimulationError(f"a row of inputs has the shape {inputs.values.shape[1:]}, not {shape}")
+        raise ExperimentError(f"a row of inputs has the shape {inputs.values.shape[1:]}, not {shape}")
     times = _on_samples(inputs.time, samples)
     last = np.diff(times, append=np.inf) > 0.0  # of rows that rounding put on one sample
     moved = Disturbance(times[last], inputs.values[last], inputs.linear)
@@ -574,12 +665,12 @@ def _rows_of(model: Model, inputs: Disturbance, samples: NDArray[np.float64]) ->
 def _samples(start: float, stop: float, step: float) -> NDArray[np.float64]:
     """Times start, start + step, ..., stop."""
     if not (np.isfinite(start) and np.isfinite(stop) and start < stop):
-        raise SimulationError(f"stop_time = {in_seconds(stop)} is not after start_time = {in_seconds(start)}")
+        raise ExperimentError(f"stop_time = {in_seconds(stop)} is not after start_time = {in_seconds(start)}")
     if not (np.isfinite(step) and step > 0.0):
-        raise SimulationError(f"step = {step:g} s is not positive")
+        raise ExperimentError(f"step = {step:g} s is not positive")
     intervals = (stop - start) / step
     if intervals > LARGEST_SAMPLES:
-        raise SimulationError(f"step = {step:g} s gives more than {LARGEST_SAMPLES} samples")
+        raise ExperimentError(f"step = {step:g} s gives more than {LARGEST_SAMPLES} samples")
     whole = max(1, round(intervals))
     spacing = float(np.spacing(max(abs(start), abs(stop))))
     if abs(intervals - whole) <= 1e-9 * whole + 2.0 * spacing / step:
@@ -587,7 +678,7 @@ def _samples(start: float, stop: float, step: float) -> NDArray[np.float64]:
     else:
         times = np.append(start + step * np.arange(int(intervals) + 1), stop)
     if np.diff(times).min() <= 0.0:
-        raise SimulationError(f"step = {step:g} s is below the resolution of times at {in_seconds(stop)}")
+        raise ExperimentError(f"step = {step:g} s is below the resolution of times at {in_seconds(stop)}")
     return times
 
 
@@ -595,11 +686,11 @@ def _schedule(model: Model, changes: Changes, samples: NDArray[np.float64]) -> d
     """The changes by time, their values checked; a time that is nearly a sample's becomes that sample's."""
     schedule: dict[float, dict[str, Value]] = {}
     start, stop = float(samples[0]), float(samples[-1])
-    times = {number_argument(when, "the time of a change", SimulationError): when for when in changes}
+    times = {number_argument(when, "the time of a change", ExperimentError): when for when in changes}
     when = np.array(sorted(times), dtype=np.float64)
     for time, point in zip(when.tolist(), _on_samples(when, samples).tolist(), strict=True):
         if not start <= point < stop:
-            raise SimulationError(
+            raise ExperimentError(
                 f"the change at {in_seconds(time)} is outside [{start:.15g}, {stop:.15g}) s"
             )
         values = {
@@ -624,7 +715,7 @@ def _check_set_once(model: Model, values: Iterable[Mapping[str, Value]]) -> None
     inputs = {variable.name for variable in model.indexed("d_ext").values()}
     twice = next((name for each in values for name in each if name in inputs), None)
     if twice is not None:
-        raise SimulationError(f"{twice} is set twice: by inputs and by start_values or changes")
+        raise ExperimentError(f"{twice} is set twice: by inputs and by start_values or changes")
 
 
 def _references(variables: Iterable[Variable]) -> Any:
@@ -634,4 +725,4 @@ def _references(variables: Iterable[Variable]) -> Any:
 
 def _check_finite(array: NDArray[np.float64], name: str) -> None:
     if not np.all(np.isfinite(array)):
-        raise SimulationError(f"{name} must be finite")
+        raise ExperimentError(f"{name} must be finite")

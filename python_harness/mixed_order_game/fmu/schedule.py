@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import MixedOrderGameError
-from ..files.reading import ReadError, number_of, read_table, read_text, suffix_of, toml_of
+from ..files.reading import ReadError, expect_file, number_of, read_table, read_text, suffix_of, toml_of
 from ..files.writing import DISTURBANCE, GRAPH_SCHEDULE, Kind, write_file
 from ..game.graphs import CommunicationGraph, edge_values, graphs_of_text
 from ..names import parse_name
@@ -29,7 +29,7 @@ LARGEST_ENTRIES = 1_000_000
 TIME = "time"
 
 
-class ScheduleError(MixedOrderGameError):
+class ScheduleError(MixedOrderGameError, ValueError):
     """A schedule or disturbance file that cannot be read or does not fit the game."""
 
 
@@ -105,6 +105,7 @@ def read_graph_schedule(path: Path | str, model: Model) -> GraphSchedule:
     suffix = suffix_of(path)
     if suffix not in readers:
         raise ScheduleError(f"{path} must end in .toml or .csv")
+    expect_file(path, "schedule", ScheduleError)
     try:
         return readers[suffix](path, model)
     except ReadError as error:
@@ -215,6 +216,7 @@ def read_disturbance(path: Path | str, model: Model, *, linear: bool = False) ->
     path = Path(path)
     if suffix_of(path) != ".csv":
         raise ScheduleError(f"{path} must end in .csv")
+    expect_file(path, "disturbance file", ScheduleError)
     try:
         return _disturbance(path, model, linear=linear)
     except ReadError as error:

@@ -42,10 +42,29 @@ class _Found:
 
 
 def check_game(game: Path | str) -> tuple[Problem, ...]:
-    """The problems found in a game file, or in a game of the package by its name; empty if it is valid.
+    """Find the problems in a game file; without the package jsonschema the first one only.
 
-    Only the first one where jsonschema is not installed.
-    Raises GameError if there is no such file, BuildError if the installation lacks the host tool.
+    Parameters
+    ----------
+    game
+        A game file (.toml) or a game of the package by its name.
+
+    Returns
+    -------
+    tuple of Problem
+        Line, column and sentence of each; empty if the file is valid.
+
+    Raises
+    ------
+    GameError
+        If there is no such file (a FileNotFoundError, too).
+    BuildError
+        If the installation lacks the host tool.
+
+    Examples
+    --------
+    >>> mog.check_game("five_vehicles")
+    ()
     """
     game = game_file(game)
     expect_file(game, "game file", GameError)

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from ..errors import BuildError, GameError, ModelError, reason
 from ..files.reading import expect_file, suffix_of
 from ..files.temporary import temporary_folder
-from ..fmu.build import host_tool, source_of
+from ..fmu.build import GameSource, host_tool, source_of
 
 FloatArray = NDArray[np.float64]
 
@@ -107,7 +107,7 @@ class Equilibrium:
         }
 
 
-def judge_equilibrium(game: Path | str | None) -> Equilibrium | None:
+def judge_equilibrium(game: GameSource) -> Equilibrium | None:
     """Judge the equilibrium of a game: a file, an FMU's own file, a game of the package by its name.
 
     None if some players are elsewhere: nothing is known of their costs.

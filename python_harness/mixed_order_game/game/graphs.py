@@ -27,7 +27,7 @@ EDGE = re.compile(r"(\d+)([->])(\d+)(?::([0-9.eE+-]+))?")
 DIRECTED = "directed:"
 
 
-class GraphError(MixedOrderGameError):
+class GraphError(MixedOrderGameError, ValueError):
     """A communication graph that is not one, or that a game cannot take."""
 
 

@@ -47,9 +47,28 @@ class Recipe:
 
 
 def new_game(recipe: Recipe) -> str:
-    """The text of a game file; equal recipes give equal texts.
+    """Write a game that is valid at once, with comments and gains that suit its graph.
 
-    Raises GameError for sizes and orders that make no sense, GraphError for such a graph.
+    Parameters
+    ----------
+    recipe
+        Players, dimension, orders, graph, seed, title, schema.
+
+    Returns
+    -------
+    str
+        The text of a game file.
+
+    Raises
+    ------
+    GameError
+        For a recipe that makes no game.
+
+    Examples
+    --------
+    >>> text = mog.new_game(mog.Recipe(players=3, dimension=1, graph="path"))
+    >>> text.count("[[player]]")
+    3
     """
     N, D = recipe.players, recipe.dimension
     if not SMALLEST_PLAYERS <= N <= LARGEST_PLAYERS:

@@ -16,15 +16,10 @@ from numpy.typing import NDArray
 
 from ..errors import ResultError
 from ..names import indices_of
-from ..results.plot import (
-    BELOW_FLOOR,
-    PALETTE,
-    SMALLEST_ERROR,
-    earlier_equilibria,
-    edges_of,
-    integrator_floor,
-)
+from ..results.graph_figure import edges_of
+from ..results.plot import BELOW_FLOOR, SMALLEST_ERROR, earlier_equilibria, integrator_floor
 from ..results.result import Result
+from ..results.style import PALETTE
 from .evidence import Evidence, energy_so_far, shared_signal, sphere_switches, weight_bound
 
 FloatArray = NDArray[np.float64]

@@ -13,11 +13,12 @@ import numpy as np
 from ..errors import GameError
 from ..extras import need
 from ..files.writing import PAGE, RESULT, check_output, write_file
+from ..fmu.build import SOURCE_OR_RESULT, GameSource, fmu_of
 from ..fmu.model import Value, sources
 from ..game.parameters import game_parameters
 from ..names import parse_name
+from ..results.graph_figure import edges_of, is_directed
 from ..results.metrics import SETTLED
-from ..results.plot import edges_of, is_directed
 from ..results.result import Result, load
 from ..version import package_version
 from .evidence import Evidence, energy_so_far, evidence_of_game, evidence_of_result
@@ -42,7 +43,7 @@ class Report:
 
 
 def report(
-    source: Path | str | None,
+    source: GameSource | Result,
     output: Path | str,
     *,
     changes: Mapping[str, Value] | None = None,
@@ -51,31 +52,66 @@ def report(
     force: bool = False,
     progress: Callable[[str, float], None] | None = None,
 ) -> Report:
-    """Write the page of an FMU, a game file, a game of the package by name, or a stored result.
+    """Write one HTML page about a game or a run: figures, claims, parameters. It needs no network.
 
-    None stands for the paper's example.
+    Parameters
+    ----------
+    source
+        An FMU (.fmu), a game file (.toml), a game of the package by its name, a `Game`, a result file
+        (.parquet, .csv), a `Result`; the paper's example for None.
+    output
+        The page (.html). It replaces a page, with `force` any file but the source; that is judged before any
+        run.
+    changes
+        Start values in place of the FMU's own. The claims, which are about the game as it stands, are then
+        left out.
+    claims
+        Whether the paper's claims are judged, which takes more and longer runs.
+    stop_time
+        End of the runs in s; default the FMU's.
+    force
+        Whether a file of another kind is replaced.
+    progress
+        Called with the name of a run and the part of it done, 0 to 1.
 
-    changes, claims, stop_time (s) and progress: as in evidence_of_game; a stored result takes none of them.
-    The page replaces a page, with force any file but the source; that is judged before any run.
-    Raises what running, judging and loading raise; ResultError if the page cannot be written.
+    Returns
+    -------
+    Report
+        The path and what the page shows.
+
+    Raises
+    ------
+    MissingPackageError
+        Without the extra `report` (an ImportError, too).
+    GameError, ModelError, VariableError, SimulationError
+        As running and judging do; GameError for changes or a stop time of a stored run.
+    ResultError
+        If a stored run cannot be read or the page cannot be written.
+
+    Examples
+    --------
+    >>> page = mog.report("rivalling_pairs", "rivals.html", claims=False)
+    >>> page.path.name
+    'rivals.html'
     """
-    from ..fmu.build import SOURCE_OR_RESULT, fmu_of
-
     output = Path(output)
-    check_output(output, PAGE, inputs=[source], force=force)
+    inputs = [Path(source)] if isinstance(source, str | Path) else []
+    check_output(output, PAGE, inputs=inputs, force=force)
     for module in ("jinja2", "plotly.offline"):
         need(module)  # before any run
-    if source is not None and RESULT.takes(Path(source)):
+    if isinstance(source, str | Path) and RESULT.takes(Path(source)):
+        source = load(source)
+    if isinstance(source, Result):
         if changes or stop_time is not None:
-            raise GameError(f"{source} is a stored run: it takes neither parameters nor a stop time")
-        evidence = evidence_of_result(load(source))
+            raise GameError("a stored run takes neither parameters nor a stop time")
+        evidence = evidence_of_result(source)
     else:
         fmu = fmu_of(source, SOURCE_OR_RESULT)
         evidence = evidence_of_game(
             fmu, changes=changes, claims=claims, stop_time=stop_time, progress=progress
         )
     page = render_page(evidence)
-    write_file(output, PAGE, lambda file: file.write(page.encode()), inputs=[source], force=force)
+    write_file(output, PAGE, lambda file: file.write(page.encode()), inputs=inputs, force=force)
     return Report(output, evidence)
 
 

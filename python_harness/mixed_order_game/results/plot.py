@@ -5,41 +5,60 @@ writes it. Colour tells the player (Okabe and Ito's palette, safe for colour-bli
 coordinate.
 """
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from contextlib import AbstractContextManager
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
-from typing import IO, Any, Literal, cast
+from typing import IO, TYPE_CHECKING, Any
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
+from numpy.typing import NDArray
 
 from ..errors import PlotError, ResultError
 from ..files.reading import suffix_of
 from ..files.writing import FIGURE, write_file
 from ..fmu.model import Model
 from ..names import parse_name
-from .result import FloatArray, Result
+from .graph_figure import SECOND_ORDER, edges_of, graph_of_result, is_directed, plot_graph
+from .style import (
+    COLUMN_WIDTH,
+    LARGEST_LEGEND,
+    LINE_STYLES,
+    PAGE_WIDTH,
+    TWO_COLUMNS,
+    colours,
+    legend_above,
+    new_axes,
+    paper_style,
+    width_of,
+)
 
-COLUMN_WIDTH = 3.5
-"""Width of a column of a two-column paper, in inches."""
+if TYPE_CHECKING:
+    from .result import Result
 
-PAGE_WIDTH = 7.16
-"""Width of the whole page, in inches."""
+__all__ = [
+    "COLUMN_WIDTH",
+    "KINDS",
+    "PAGE_WIDTH",
+    "draw",
+    "graph_of_result",
+    "new_axes",
+    "paper_figures",
+    "paper_style",
+    "plot_error",
+    "plot_graph",
+    "plot_plane",
+    "plot_positions",
+    "plot_velocities",
+    "result_figures",
+    "save_figure",
+]
 
-TWO_COLUMNS = 5.0
-"""Width in inches from which a legend is one line."""
+FloatArray = NDArray[np.float64]
 
 PLANE = 2
 """Coordinates of a game whose paths can be drawn."""
-
-PALETTE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#F0E442")
-LINE_STYLES: tuple[Literal["-", "--", ":", "-."], ...] = ("-", "--", ":", "-.")
-LARGEST_LEGEND = 10
-"""Most players that are named one by one."""
 
 SETTLED = 0.02
 """Part of a signal's range within which it counts as settled."""
@@ -58,41 +77,11 @@ SMALLEST_ERROR = 1e-17
 BELOW_FLOOR = 1e-2
 """Part of the integrator's tolerance at which a logarithmic axis ends."""
 
-SECOND_ORDER = 2
-
 CREATOR = "mixed-order-game"
 """What the files say of themselves, so that they are known again."""
 
-STYLE: Mapping[str, Any] = {
-    "font.size": 8.0,
-    "axes.labelsize": 8.0,
-    "axes.titlesize": 8.0,
-    "xtick.labelsize": 7.0,
-    "ytick.labelsize": 7.0,
-    "legend.fontsize": 7.0,
-    "axes.linewidth": 0.6,
-    "lines.linewidth": 1.0,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.grid": True,
-    "grid.color": "0.9",
-    "grid.linewidth": 0.5,
-    "font.family": "serif",
-    "font.serif": ["STIXGeneral"],
-    "mathtext.fontset": "stix",
-    "figure.dpi": 150.0,
-    "savefig.dpi": 300.0,
-    "svg.hashsalt": "mixed-order-game",
-    "pdf.fonttype": 42,
-}
 
-
-def paper_style() -> AbstractContextManager[None]:
-    """Matplotlib settings of these figures, for a with statement around a figure of one's own."""
-    return mpl.rc_context(cast("Any", dict(STYLE)))
-
-
-def plot_positions(result: Result, axes: Axes | None = None, *, width: float = COLUMN_WIDTH) -> Axes:
+def plot_positions(result: "Result", axes: Axes | None = None, *, width: float = COLUMN_WIDTH) -> Axes:
     """Actions x_il over time, one line each, and their equilibrium as thin lines. width in inches.
 
     The equilibrium is that of each time, with steps where costs change. Raises ResultError if x was not
@@ -110,7 +99,7 @@ def plot_positions(result: Result, axes: Axes | None = None, *, width: float = C
     return axes
 
 
-def plot_velocities(result: Result, axes: Axes | None = None, *, width: float = COLUMN_WIDTH) -> Axes:
+def plot_velocities(result: "Result", axes: Axes | None = None, *, width: float = COLUMN_WIDTH) -> Axes:
     """Velocities v_il of the second-order players over time, one line each. width in inches.
 
     Raises PlotError if no player has order 2, ResultError if v was not recorded.
@@ -128,18 +117,18 @@ def plot_velocities(result: Result, axes: Axes | None = None, *, width: float = 
 
 
 def plot_error(
-    results: Result | Mapping[str, Result], axes: Axes | None = None, *, width: float = COLUMN_WIDTH
+    results: "Result | Mapping[str, Result]", axes: Axes | None = None, *, width: float = COLUMN_WIDTH
 ) -> Axes:
     """Distance to the equilibrium, |x - x*|_2, on a logarithmic axis; one line a labelled result.
 
     Shaded in a line's colour is what lies within the integrator's tolerance, where that line goes there.
     Raises ResultError if nash_error was not recorded.
     """
-    labelled = {"": results} if isinstance(results, Result) else results
+    labelled = {"": results} if not isinstance(results, Mapping) else results
     floors: dict[float, Any] = {}
     with paper_style():
         axes = axes or new_axes(width)
-        for (label, result), colour in zip(labelled.items(), _colours(len(labelled)), strict=True):
+        for (label, result), colour in zip(labelled.items(), colours(len(labelled)), strict=True):
             axes.plot(result.time, np.maximum(result.nash_error, SMALLEST_ERROR), color=colour, label=label)
             floor = integrator_floor(result)
             if result.nash_error.min() < floor:
@@ -158,11 +147,11 @@ def plot_error(
         named = [k for k, label in enumerate(labels) if label]
         if named:
             columns = 1 if width < TWO_COLUMNS else len(named)
-            _above(axes, [handles[k] for k in named], [labels[k] for k in named], columns=columns)
+            legend_above(axes, [handles[k] for k in named], [labels[k] for k in named], columns=columns)
     return axes
 
 
-def integrator_floor(result: Result) -> float:
+def integrator_floor(result: "Result") -> float:
     """2-norm of what the integrator's tolerance allows as error of actions at x*; NaN if it is unknown."""
     relative = float(result.parameters.get("tolerance_relative") or result.tolerance)
     absolute = float(result.parameters.get("tolerance_absolute") or 0.01 * relative)
@@ -172,7 +161,7 @@ def integrator_floor(result: Result) -> float:
 
 
 def plot_plane(
-    result: Result,
+    result: "Result",
     axes: Axes | None = None,
     *,
     edges: Iterable[tuple[int, int, float]] | None = None,
@@ -188,7 +177,7 @@ def plot_plane(
     if result.dimension != PLANE:
         raise PlotError(f"paths are drawn in the plane: the game has {result.dimension} coordinates, not 2")
     x = result.x
-    colours = _colours(result.players)
+    palette = colours(result.players)
     directed = is_directed(result)
     with paper_style():
         axes = axes or new_axes(width, height=0.95 * width)
@@ -204,7 +193,7 @@ def plot_plane(
                     arrowprops={"arrowstyle": "->", "color": "0.6", "linewidth": width_of_edge},
                     zorder=2,
                 )
-        for i, colour in enumerate(colours):
+        for i, colour in enumerate(palette):
             axes.plot(*x[:, i].T, color=colour, label=str(i + 1), gid="path")
             axes.plot(*x[0, i], color=colour, marker="o", markersize=9.0, linestyle="none", zorder=3)
             if result.players <= LARGEST_LEGEND:
@@ -234,8 +223,25 @@ def plot_plane(
             del keys["equilibrium before"]
         if not any(line.get_gid() == "edge" for line in axes.lines):
             del keys["communication"]
-        _above(axes, list(keys.values()), list(keys), columns=2 if width < TWO_COLUMNS else len(keys))
+        legend_above(axes, list(keys.values()), list(keys), columns=2 if width < TWO_COLUMNS else len(keys))
     return axes
+
+
+KINDS: Mapping[str, Callable[..., Axes]] = {
+    "positions": plot_positions,
+    "velocities": plot_velocities,
+    "error": plot_error,
+    "plane": plot_plane,
+    "graph": graph_of_result,
+}
+"""Figures of one run by the names of their files."""
+
+
+def draw(result: "Result", kind: str, axes: Axes | None = None, *, width: float = COLUMN_WIDTH) -> Axes:
+    """One figure of a run, of a kind in KINDS. Raises PlotError for another one, and as the figure does."""
+    if kind not in KINDS:
+        raise PlotError(f"there is no figure {kind}: it is one of {', '.join(KINDS)}")
+    return KINDS[kind](result, axes, width=width)
 
 
 def paper_figure_names(model: Model) -> list[str]:
@@ -246,7 +252,7 @@ def paper_figure_names(model: Model) -> list[str]:
     return [*names, "error", *(["plane"] if model.dimension == PLANE else [])]
 
 
-def paper_figures(robust: Result, plain: Result, *, width: float = COLUMN_WIDTH) -> dict[str, Axes]:
+def paper_figures(robust: "Result", plain: "Result", *, width: float = COLUMN_WIDTH) -> dict[str, Axes]:
     """The paper's four figures by file name, then the error of both runs and, for D = 2, the robust paths.
 
     robust: a run with the robust part and the perturbations; plain: one with neither. The figures of
@@ -265,7 +271,7 @@ def paper_figures(robust: Result, plain: Result, *, width: float = COLUMN_WIDTH)
     return {name: draw() for name, draw in figures.items()}
 
 
-def result_figures(result: Result, *, width: float = COLUMN_WIDTH) -> dict[str, Axes]:
+def result_figures(result: "Result", *, width: float = COLUMN_WIDTH) -> dict[str, Axes]:
     """Every figure that one result allows, by file name. Raises ResultError if it allows none."""
     recorded = {parse_name(name)[0] for name in result.columns}
     figures = {}
@@ -314,48 +320,20 @@ def save_figure(axes: Axes, path: Path | str, *, force: bool = False) -> Path:
     return write_file(path, FIGURE, write, force=force)
 
 
-def new_axes(width: float = COLUMN_WIDTH, height: float | None = None) -> Axes:
-    """Axes of a new figure, width by height inches (height: 0.68 of the width if not given)."""
-    figure = Figure(figsize=(width, 0.68 * width if height is None else height), layout="constrained")
-    axes: Axes = figure.subplots()
-    return axes
-
-
-def edges_of(result: Result) -> list[tuple[int, int, float]]:
-    """Communication graph among a result's parameters, 1-based, positive weights: (i, j, weight) with i < j.
-
-    Of a directed graph (from, to, weight), see is_directed.
-    """
-    directed = is_directed(result)
-    edges = []
-    for name, value in result.parameters.items():
-        stem, index = parse_name(name)
-        if stem == "a" and value > 0.0:
-            i, j = (index[1], index[0]) if directed else (index[0], index[1])
-            edges.append((i, j, float(value)))
-    return edges
-
-
-def is_directed(result: Result) -> bool:
-    """Whether the communication graph among a result's parameters is directed: it has a[i,j] with i > j."""
-    parsed = map(parse_name, result.parameters)
-    return any(stem == "a" and index[0] > index[1] for stem, index in parsed)
-
-
-def earlier_equilibria(result: Result, players: int | None = None) -> FloatArray:
+def earlier_equilibria(result: "Result", players: int | None = None) -> FloatArray:
     """Equilibria of the first players, or of all, that costs changed on the way left behind, (K, D)."""
     points = np.round(result.equilibria[:, :players], 12)
     return np.unique(points[np.any(points != points[-1], axis=2)], axis=0)
 
 
-def _second_order(result: Result) -> list[int]:
+def _second_order(result: "Result") -> list[int]:
     """Players with a velocity, 0-based."""
     return [i for i in range(result.players) if not np.isnan(result.v[:, i]).all()]
 
 
-def _lines(axes: Axes, result: Result, stem: str) -> None:
+def _lines(axes: Axes, result: "Result", stem: str) -> None:
     values: FloatArray = getattr(result, stem)
-    for i, colour in enumerate(_colours(result.players)):
+    for i, colour in enumerate(colours(result.players)):
         for coordinate in range(result.dimension):
             if not np.isnan(values[:, i, coordinate]).all():
                 style = LINE_STYLES[coordinate % len(LINE_STYLES)]
@@ -363,7 +341,7 @@ def _lines(axes: Axes, result: Result, stem: str) -> None:
                 axes.plot(result.time, values[:, i, coordinate], color=colour, linestyle=style, label=label)
 
 
-def _inset(axes: Axes, result: Result, stem: str) -> None:
+def _inset(axes: Axes, result: "Result", stem: str) -> None:
     """Enlarge a short transient in the half above or below the settled lines, if that is free."""
     values = getattr(result, stem)
     span = float(np.nanmax(values) - np.nanmin(values))
@@ -389,13 +367,6 @@ def _inset(axes: Axes, result: Result, stem: str) -> None:
     inset.yaxis.set_major_locator(MaxNLocator(nbins=3, steps=[1, 2, 5, 10]))
 
 
-def _colours(count: int) -> Sequence[Any]:
-    """The palette, or a perceptually even map if it does not suffice."""
-    if count <= len(PALETTE):
-        return PALETTE[:count]
-    return [mpl.colormaps["viridis"](value) for value in np.linspace(0.0, 0.95, count)]
-
-
 def _over_time(axes: Axes, label: str) -> None:
     axes.set_xlabel("time (s)")
     axes.set_ylabel(label)
@@ -403,22 +374,22 @@ def _over_time(axes: Axes, label: str) -> None:
     axes.xaxis.set_major_locator(MaxNLocator(nbins=6, steps=[1, 2, 5, 10]))
 
 
-def _unit(result: Result, stem: str, otherwise: str = "") -> str:
+def _unit(result: "Result", stem: str, otherwise: str = "") -> str:
     """The unit of a signal in brackets; nothing for a dimensionless one."""
     found = (unit for name, unit in result.units.items() if parse_name(name)[0] == stem)
     unit = next(found, otherwise)
     return f" ({unit})" if unit not in ("", "1") else ""
 
 
-def _legend(axes: Axes, players: Iterable[int], result: Result, *, equilibrium: bool) -> None:
+def _legend(axes: Axes, players: Iterable[int], result: "Result", *, equilibrium: bool) -> None:
     """Colour for the player, style for the coordinate, above the axes so that it covers no curve."""
     chosen = list(players)
-    colours = _colours(result.players)
+    palette = colours(result.players)
     handles: list[Line2D] = []
     labels: list[str] = []
     if len(chosen) <= LARGEST_LEGEND:
         for i in chosen:
-            handles.append(Line2D([], [], color=colours[i]))
+            handles.append(Line2D([], [], color=palette[i]))
             labels.append(f"$i={i + 1}$")
     for coordinate in range(min(result.dimension, len(LINE_STYLES)) if result.dimension > 1 else 0):
         handles.append(Line2D([], [], color="0.3", linestyle=LINE_STYLES[coordinate]))
@@ -426,27 +397,4 @@ def _legend(axes: Axes, players: Iterable[int], result: Result, *, equilibrium: 
     if equilibrium:
         handles.append(Line2D([], [], color=EQUILIBRIUM, linewidth=0.6))
         labels.append("$x^*$")
-    _above(axes, handles, labels, columns=5 if _width(axes) < TWO_COLUMNS else 12)
-
-
-def _width(axes: Axes) -> float:
-    """Width of the figure in inches."""
-    figure = axes.get_figure(root=True)
-    return COLUMN_WIDTH if figure is None else float(figure.get_size_inches()[0])
-
-
-def _above(axes: Axes, handles: Sequence[Any], labels: Sequence[str], columns: int) -> None:
-    count = len(handles)
-    by_rows = [k for column in range(columns) for k in range(column, count, columns)]
-    axes.legend(
-        [handles[k] for k in by_rows],
-        [labels[k] for k in by_rows],
-        loc="lower left",
-        bbox_to_anchor=(0.0, 1.0),
-        ncols=columns,
-        frameon=False,
-        borderaxespad=0.1,
-        handlelength=1.3,
-        handletextpad=0.4,
-        columnspacing=0.9,
-    )
+    legend_above(axes, handles, labels, columns=5 if width_of(axes) < TWO_COLUMNS else 12)

@@ -13,22 +13,27 @@ from typing import IO, TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import ResultError, reason
+from ..errors import NotRecordedError, ResultError, reason
 from ..extras import need
 from ..files.reading import ReadError, expect_file, number_of, read_table, suffix_of
 from ..files.writing import RESULT, write_file
 from ..names import indices_of, parse_name
+from ..notebook import digits, folded, page, paragraph, table
 from ..times import in_seconds, time_slack
-from .metrics import Metrics, sampled_metrics
+from .metrics import METRIC_UNITS, Metrics, sampled_metrics
 
 if TYPE_CHECKING:
     import pandas as pd
     import xarray
+    from matplotlib.axes import Axes
 
 
 FloatArray = NDArray[np.float64]
 
 METADATA_KEY = b"mixed_order_game"
+MOST_SHOWN = 10
+"""Players whose ends a notebook lists."""
+
 DIMENSIONS = {
     1: ("player",),
     2: ("player", "coordinate"),
@@ -82,8 +87,42 @@ class Result:
             found = indices_of(self.columns, name)
             if found:
                 first = next(iter(found.values()))
-                raise ResultError(f"{name} has indices: name one variable, such as {first}") from None
-            raise ResultError(f"{name} was not recorded: name it in the outputs of the run") from None
+                raise NotRecordedError(f"{name} has indices: name one variable, such as {first}") from None
+            raise NotRecordedError(f"{name} was not recorded: name it in the outputs of the run") from None
+
+    def _repr_html_(self) -> str:
+        """For notebooks: where the run ended, what is measured on it, what it holds."""
+        parts = [paragraph(repr(self)[1:-1])]
+        stems = {parse_name(name)[0] for name in self.columns}
+        if {"x", "x_star"} <= stems:
+            parts += [self._ends(), self._figures()]
+        if self.changed:
+            parts.append(paragraph("changed: " + ", ".join(f"{k} = {v}" for k, v in self.changed.items())))
+        parts.append(folded(f"{len(self.columns)} signals", paragraph(", ".join(self.columns))))
+        return page(self.title or "Stored run", *parts)
+
+    def _ends(self) -> str:
+        x, x_star = self.x[-1], self.x_star
+        shown = min(self.players, MOST_SHOWN)
+        rows = [
+            (
+                str(i + 1),
+                ", ".join(map(digits, x[i])),
+                ", ".join(map(digits, x_star[i])),
+                digits(float(np.linalg.norm(x[i] - x_star[i]))),
+            )
+            for i in range(shown)
+        ]
+        more = [] if shown == self.players else [(f"and {self.players - shown} more", "", "", "")]
+        return table(["player", "x at the end", "x*", "|x - x*|"], [*rows, *more])
+
+    def _figures(self) -> str:
+        found = self.metrics
+        rows = [
+            (name.replace("_", " "), digits(getattr(found, name)), unit)
+            for name, unit in METRIC_UNITS.items()
+        ]
+        return table(["figure", "value", "unit"], rows)
 
     @property
     def players(self) -> int:
@@ -99,7 +138,7 @@ class Result:
     def _actions(self) -> Mapping[tuple[int, ...], str]:
         found = indices_of(self.columns, "x_star") or indices_of(self.columns, "x")
         if not found:
-            raise ResultError("neither x_star nor x was recorded: the number of players is unknown")
+            raise NotRecordedError("neither x_star nor x was recorded: the number of players is unknown")
         return found
 
     @property
@@ -215,8 +254,43 @@ class Result:
     def _array(self, stem: str, shape: tuple[int, ...]) -> FloatArray:
         array = gather(self.columns, stem, shape)
         if array is None:
-            raise ResultError(f"{stem} was not recorded: name it in the outputs of the run")
+            raise NotRecordedError(f"{stem} was not recorded: name it in the outputs of the run")
         return array
+
+    def plot(self, kind: str = "positions", axes: "Axes | None" = None, *, width: float = 3.5) -> "Axes":
+        """Draw one figure of the run.
+
+        Parameters
+        ----------
+        kind
+            What is drawn, one of `mixed_order_game.results.plot.KINDS`: positions, velocities, error, plane,
+            graph, control, weights or estimates.
+        axes
+            Matplotlib axes to draw into; a figure of its own when left out.
+        width
+            Width of a figure of its own in inches; 3.5 is a column of a two-column paper.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+            The axes; `results.plot.save_figure` writes them as PDF, SVG or PNG.
+
+        Raises
+        ------
+        PlotError
+            For another kind, and for a figure that this game does not have.
+        ResultError
+            If a signal that it needs was not recorded.
+
+        Examples
+        --------
+        >>> result = mog.run(stop_time=0.5)
+        >>> result.plot("error").get_yscale()
+        'log'
+        """
+        from .plot import draw
+
+        return draw(self, kind, axes, width=width)
 
     def to_pandas(self) -> "pd.DataFrame":
         """One row a sample, indexed by time, one column a variable."""
@@ -309,7 +383,28 @@ def gather(
 
 
 def load(path: Path | str) -> Result:
-    """Read a result written by Result.save. Raises ResultError if the file is missing or is not one."""
+    """Read a result that `Result.save` or `mog run` wrote.
+
+    Parameters
+    ----------
+    path
+        A .parquet file, or a .csv file, which holds the values alone.
+
+    Returns
+    -------
+    Result
+
+    Raises
+    ------
+    ResultError
+        If the file is missing (a FileNotFoundError, too) or is no result.
+
+    Examples
+    --------
+    >>> path = mog.run("rivalling_pairs", stop_time=0.1).save("rivals.csv")
+    >>> mog.load(path).x.shape
+    (6, 4, 2)
+    """
     path = Path(path)
     readers = {".csv": _read_csv, ".parquet": _read_parquet}
     suffix = suffix_of(path)

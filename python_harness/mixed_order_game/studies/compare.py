@@ -4,17 +4,26 @@ Without the network beta = 0: the weights start at 0 and stay there. Without phi
 the strategy of Theorem 2, robust = false.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, cast
 
 from ..errors import MixedOrderGameError, ResultError, SimulationError
-from ..fmu.model import Value
+from ..files.writing import RESULT
+from ..fmu.build import SOURCE_OR_RESULT, GameSource, fmu_of
+from ..fmu.model import Model, Value, read_model
 from ..interrupts import noted_signals
+from ..notebook import digits, page, paragraph, table
 from ..results.metrics import METRIC_UNITS, Metrics
 from ..results.result import Result, load
 from .sampler import Sampler, Settings
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+Source = GameSource | Result
+"""A game that is run, or a run that was recorded."""
 
 BASELINES: Mapping[str, Mapping[str, Value]] = {
     "without network": {"beta": 0.0},
@@ -26,8 +35,12 @@ BASELINES: Mapping[str, Mapping[str, Value]] = {
 AS_IT_IS = "as it is"
 
 
-class CompareError(MixedOrderGameError):
+class CompareError(MixedOrderGameError, ValueError):
     """Runs that cannot be set side by side."""
+
+
+class UnknownRunError(CompareError, KeyError):
+    """A label that no run has."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +72,43 @@ class Comparison:
         for run in self.runs:
             if run.label == label:
                 return run
-        raise CompareError(f"no run is called {label!r}: {', '.join(run.label for run in self.runs)}")
+        raise UnknownRunError(f"no run is called {label!r}: {', '.join(run.label for run in self.runs)}")
+
+    def _repr_html_(self) -> str:
+        """For notebooks: the figures of every run, a row each."""
+        header = [
+            "run",
+            *(name.replace("_", " ") + (f" ({unit})" if unit else "") for name, unit in METRIC_UNITS.items()),
+        ]
+        rows = [
+            (run.label, *(digits(float(getattr(run.metrics, name, float("nan")))) for name in METRIC_UNITS))
+            for run in self.runs
+        ]
+        errors = [paragraph(f"{run.label}: {run.error}") for run in self.runs if run.error]
+        return page("Runs side by side", table(header, rows), *errors)
+
+    def plot(self, axes: "Axes | None" = None, *, width: float = 3.5) -> "Axes":
+        """Draw the distances to the equilibrium over time, on a logarithmic axis.
+
+        Parameters
+        ----------
+        axes
+            Matplotlib axes to draw into; a figure of its own when left out.
+        width
+            Width of a figure of its own in inches.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+
+        Raises
+        ------
+        ResultError
+            If nash_error was not recorded.
+        """
+        from ..results.plot import plot_error
+
+        return plot_error(self.results, axes, width=width)
 
     @property
     def results(self) -> dict[str, Result]:
@@ -91,45 +140,141 @@ class Comparison:
 
 
 def compare(
-    fmu: Path | str,
+    sources: Source | Sequence[Source] = None,
     variants: Mapping[str, Mapping[str, Value]] | None = None,
     *,
     start_values: Mapping[str, Value] | None = None,
     baselines: bool = True,
-    settings: Settings | None = None,
+    stop_time: float | None = None,
+    step: float | None = None,
+    tolerance: float | None = None,
+    settle_time: float | None = None,
+    band: float | None = None,
 ) -> Comparison:
-    """Run a game as it is, its variants, and the baselines of the game as it is.
+    """Set runs side by side: games as they are, their variants and baselines, and runs that were recorded.
 
-    variants: start values by label, on top of start_values, which all runs share.
-    settings: horizon, sampling and what settling means. The band of the settling time is that of the first
-    run for all, unless given: 2 % of its largest initial |x - x*|.
-    Raises VariableError for values that the FMU does not take; a run that it gives up becomes an entry with
-    its words.
+    The baselines show what the parts of the control are worth: a game without the network (beta = 0), without
+    phi (delta = 0) and without both (robust = false).
+
+    Parameters
+    ----------
+    sources
+        One or several of: an FMU (.fmu), a game file (.toml), a game of the package by its name, a `Game`, a
+        result file (.parquet, .csv), a `Result`; the paper's example when left out.
+    variants
+        Further runs of every game: start values by label, on top of `start_values`.
+    start_values
+        Start values that all runs of games share.
+    baselines
+        Whether every game is run without its parts, too.
+    stop_time, step, tolerance
+        End of the runs and time between samples in s, relative tolerance; default each FMU's own.
+    settle_time
+        Time in s from which the final error is taken; default 80 % of the run.
+    band
+        Largest |x - x*| that counts as settled, in the game's length unit; default 2 % of the largest initial
+        |x - x*| of the first run, for all runs.
+
+    Returns
+    -------
+    Comparison
+        The recorded runs first. A run that the FMU gave up is an entry with its words and without figures.
+
+    Raises
+    ------
+    VariableError
+        For values that an FMU does not take, before any run.
+    CompareError
+        For two runs of one label, and for variants of recorded runs alone.
+    ResultError
+        If a recorded run lacks x or x_star.
+
+    Examples
+    --------
+    >>> found = mog.compare("rivalling_pairs", {"slow": {"k2": 0.5}}, baselines=False, stop_time=2.0)
+    >>> [run.label for run in found.runs]
+    ['as it is', 'slow']
     """
+    listed: list[Source] = [*sources] if isinstance(sources, list | tuple) else [cast("Source", sources)]
+    games = [each for each in listed if not (isinstance(each, Result) or _is_result_file(each))]
+    if not games and (variants or start_values):
+        raise CompareError("recorded runs are not run again: variants and start values need a game")
+    models = [read_model(fmu_of(game, SOURCE_OR_RESULT)) for game in games]
+    wanted = _wanted(variants or {}, baselines=baselines)
+    for model in models:
+        for values in wanted.values():
+            model.start_values({**model.expanded(start_values or {}), **model.expanded(values)})
+    recorded = _recorded([each for each in listed if isinstance(each, Result) or _is_result_file(each)])
+    runs = list(compare_results(recorded, band=band, settle_time=settle_time).runs)
+    for game, model in zip(games, models, strict=True):
+        first = next((run.metrics for run in runs if run.metrics is not None), None)
+        settings = Settings(
+            stop_time=model.stop_time if stop_time is None else stop_time,
+            step=model.step if step is None else step,
+            tolerance=model.tolerance if tolerance is None else tolerance,
+            settle_time=settle_time,
+            band=band if first is None else first.band,
+        )
+        prefix = "" if len(listed) == 1 else f"{_name_of(game, model)}: "
+        runs += [
+            run.renamed(prefix + run.label)
+            for run in _variants_of(model, wanted, start_values or {}, settings)
+        ]
+    return Comparison(tuple(runs))
+
+
+def _is_result_file(source: GameSource) -> bool:
+    return isinstance(source, str | Path) and RESULT.takes(Path(source))
+
+
+def _recorded(sources: Sequence[Source]) -> dict[str, Result]:
+    """Recorded runs by label: files by their names, objects by their titles."""
+    files = [Path(each) for each in sources if isinstance(each, str | Path)]
+    objects = [each for each in sources if isinstance(each, Result)]
+    results = load_results(files)
+    for number, each in enumerate(objects, start=1):
+        label = each.title or f"run {number}"
+        results[label if label not in results else f"{label} ({number})"] = each
+    return results
+
+
+def _name_of(game: GameSource, model: Model) -> str:
+    return Path(game).stem if isinstance(game, str | Path) else model.title
+
+
+def _wanted(
+    variants: Mapping[str, Mapping[str, Value]], *, baselines: bool
+) -> dict[str, Mapping[str, Value]]:
+    """Start values by label: the game as it is, its variants, its baselines. Raises CompareError."""
     wanted: dict[str, Mapping[str, Value]] = {AS_IT_IS: {}}
-    for label, values in [*(variants or {}).items(), *(BASELINES.items() if baselines else ())]:
+    for label, values in [*variants.items(), *(BASELINES.items() if baselines else ())]:
         if label in wanted:
             raise CompareError(f"two runs are called {label!r}")
         wanted[label] = values
-    chosen = settings or Settings()
-    band = chosen.band
-    runs: list[Compared] = []
-    with noted_signals() as take_signals, Sampler(fmu) as sampler:
-        model = sampler.model
-        shared = model.expanded(start_values or {})
-        starts = {label: {**shared, **model.expanded(values)} for label, values in wanted.items()}
-        changes = {label: model.changed_values(model.start_values(start)) for label, start in starts.items()}
-        for label, start in starts.items():
+    return wanted
+
+
+def _variants_of(
+    model: Model,
+    wanted: Mapping[str, Mapping[str, Value]],
+    start_values: Mapping[str, Value],
+    settings: Settings,
+) -> Iterator[Compared]:
+    band = settings.band
+    shared = model.expanded(start_values)
+    with noted_signals() as take_signals, Sampler(model.path) as sampler:
+        for label, values in wanted.items():
             take_signals()
+            start = {**shared, **model.expanded(values)}
+            changed = model.changed_values(model.start_values(start))
             try:
-                result = sampler.record(start, chosen)
+                result = sampler.record(start, settings)
             except SimulationError as error:
-                runs.append(Compared(label, changes[label], None, None, str(error)))
+                yield Compared(label, changed, None, None, str(error))
                 continue
-            found = result.measured(band=band, settle_time=chosen.settle_time)
+            found = result.measured(band=band, settle_time=settings.settle_time)
             band = found.band if band is None else band
-            runs.append(Compared(label, changes[label], result, found))
-    return Comparison(tuple(runs))
+            yield Compared(label, changed, result, found)
 
 
 def compare_results(

@@ -18,7 +18,7 @@ COUNTED_RANGE = 3
 PLAIN_RANGE = 2
 
 
-class DesignError(MixedOrderGameError):
+class DesignError(MixedOrderGameError, ValueError):
     """A design that makes no sense: an empty grid, a range without extent, a count that is not positive."""
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arguments import number_argument
-from ..errors import SimulationError
+from ..errors import ExperimentError
 from ..fmu.model import Model, Value
 from ..fmu.run import Block, Simulator
 from ..results.metrics import Metrics, sample_times, sampled_metrics
@@ -29,18 +29,18 @@ class Settings:
 
     def __post_init__(self) -> None:
         for name in ("stop_time", "step", "tolerance"):
-            value = number_argument(getattr(self, name), name, SimulationError)
+            value = number_argument(getattr(self, name), name, ExperimentError)
             if not (np.isfinite(value) and value > 0.0):
-                raise SimulationError(f"{name} = {value:g} is not positive")
+                raise ExperimentError(f"{name} = {value:g} is not positive")
         if self.step > self.stop_time:
-            raise SimulationError(f"step = {self.step:g} s is longer than the run, {self.stop_time:g} s")
+            raise ExperimentError(f"step = {self.step:g} s is longer than the run, {self.stop_time:g} s")
         for name in ("settle_time", "band"):
             if getattr(self, name) is not None:
-                number_argument(getattr(self, name), name, SimulationError)
+                number_argument(getattr(self, name), name, ExperimentError)
         if self.settle_time is not None and not 0.0 <= self.settle_time <= self.stop_time:
-            raise SimulationError(f"settle_time = {self.settle_time:g} s is outside the run")
+            raise ExperimentError(f"settle_time = {self.settle_time:g} s is outside the run")
         if self.band is not None and not (np.isfinite(self.band) and self.band > 0.0):
-            raise SimulationError(f"band = {self.band:g} is not positive")
+            raise ExperimentError(f"band = {self.band:g} is not positive")
 
 
 class Sampler(Simulator):

@@ -9,7 +9,6 @@ The linear loop knows no perturbation, so a largest error at the end is sought b
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
@@ -17,12 +16,14 @@ from numpy.typing import NDArray
 
 from ..arguments import number_argument
 from ..errors import MixedOrderGameError, SimulationError
+from ..fmu.build import GameSource
 from ..fmu.model import Model, Value, check_value
 from ..game.definition import require_coefficients
 from ..game.graphs import CommunicationGraph, graph_of
 from ..game.parameters import GameParameters, game_parameters
 from ..interrupts import noted_signals
-from ..results.metrics import SETTLED, Metrics
+from ..notebook import digits, page, paragraph, table
+from ..results.metrics import METRIC_UNITS, SETTLED, Metrics
 from ..theory.spectrum import initial_deviation, linear_loop, spectral_abscissa
 from .designs import Range
 from .pool import Case, open_pool, run_cases
@@ -79,11 +80,11 @@ TIGHTENING = 0.95
 LEAST_TARGET = 0.05
 
 
-class TuneError(MixedOrderGameError):
+class TuneError(MixedOrderGameError, ValueError):
     """A wish that makes no sense."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Tuned:
     """Gains found and the runs that prove them. met is false if no gains in the ranges were found to do."""
 
@@ -164,6 +165,23 @@ class Tuned:
         """Largest integral of |u|^2 over the graphs."""
         return _largest_energy(self.metrics)
 
+    def __repr__(self) -> str:
+        gains = ", ".join(f"{name} = {value:.4g}" for name, value in self.gains.items())
+        met = "met" if self.met else "not met"
+        return f"<Tuned {gains}: settles within {self.settling_time:.4g} s, the wish is {met}>"
+
+    def _repr_html_(self) -> str:
+        """For notebooks: the gains and what the slowest graph's run shows, before and after."""
+        before, after = self.start_metrics[self.worst], self.metrics[self.worst]
+        rows: list[tuple[str, ...]] = [
+            (name, digits(self.start_gains[name]), digits(value)) for name, value in self.gains.items()
+        ]
+        for name, unit in METRIC_UNITS.items():
+            cells = (digits(float(getattr(each, name, np.nan))) for each in (before, after))
+            rows.append((name.replace("_", " ") + (f" ({unit})" if unit else ""), *cells))
+        notes = [paragraph(note) for note in self.notes]
+        return page(repr(self)[1:-1], table(["", "before", "tuned"], rows), *notes)
+
     def as_json(self) -> dict[str, Any]:
         """Plain values for json.dumps."""
         worst, before = self.metrics[self.worst], self.start_metrics[self.worst]
@@ -194,7 +212,7 @@ Progress = Callable[[str, float], None]
 
 
 def tune(
-    fmu: Path | str,
+    game: GameSource,
     settling_time: float,
     *,
     graphs: Sequence[CommunicationGraph] | None = None,
@@ -208,17 +226,57 @@ def tune(
     jobs: int | None = 1,
     progress: Progress | None = None,
 ) -> Tuned:
-    """Seek gains so that the largest |x - x*| settles within settling_time, in s, on every graph.
+    """Seek gains that settle in a wished time with little control energy, on every graph.
 
-    graphs: default the game's own. gains: names to tune, in ranges (default DEFAULT_RANGES).
-    band: what settled means; default 2 % of the largest initial |x - x*|.
-    largest_error: of |x - x*| in the last fifth of the runs that verify; default any.
-    stop_time: length of the runs that verify, in s; default four times settling_time, at least 2 s.
-    jobs: processes that simulate many graphs; a script that asks for several guards its main module.
     Ctrl-C ends the search with the best gains that were simulated on every graph so far, or raises
     KeyboardInterrupt before the first.
-    Raises TuneError for a wish without sense, VariableError for gains and values that the FMU does not take,
-    GraphError for graphs that it does not take.
+
+    Parameters
+    ----------
+    game
+        An FMU (.fmu), a game file (.toml), a game of the package by its name, a `Game`; the paper's example
+        for None.
+    settling_time
+        Wish in s: the largest |x - x*| stays within the band from here on.
+    graphs
+        Graphs to tune for; default the game's own.
+    gains
+        Names of the gains to tune.
+    ranges
+        Where gains are sought; default `DEFAULT_RANGES`.
+    start_values
+        Parameters that all runs share.
+    band
+        Largest |x - x*| that counts as settled, in the game's length unit; default 2 % of the largest initial
+        one.
+    largest_error
+        Largest |x - x*| in the last fifth of the runs that verify; default any.
+    stop_time
+        Length of the runs that verify in s; default four times `settling_time`, at least 2 s.
+    seed
+        Of the search.
+    jobs
+        Processes that simulate many graphs; a script that asks for several guards its main module.
+    progress
+        Called with what is being done and the part of it done, 0 to 1.
+
+    Returns
+    -------
+    Tuned
+        The gains and the runs that prove them, one a graph.
+
+    Raises
+    ------
+    TuneError
+        For a wish without sense (a ValueError, too).
+    VariableError, GraphError
+        For gains, values and graphs that the FMU does not take.
+
+    Examples
+    --------
+    >>> found = mog.tune("energy_consumption", 2.0, gains=["k2"])
+    >>> found.met
+    True
     """
     settling_time = number_argument(settling_time, "settling_time", TuneError)
     if stop_time is not None:
@@ -231,7 +289,7 @@ def tune(
     if stop <= settling_time:
         raise TuneError(f"runs of {stop:g} s cannot show that {settling_time:g} s are met")
     with _Search(
-        fmu, settling_time, graphs, gains, ranges or {}, start_values or {}, band, largest_error, stop, jobs
+        game, settling_time, graphs, gains, ranges or {}, start_values or {}, band, largest_error, stop, jobs
     ) as search:
         return search.run(seed, progress or (lambda _name, _part: None))
 
@@ -241,7 +299,7 @@ class _Search:
 
     def __init__(
         self,
-        fmu: Path | str,
+        fmu: GameSource,
         wish: float,
         graphs: Sequence[CommunicationGraph] | None,
         gains: Sequence[str],

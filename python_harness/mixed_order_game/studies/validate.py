@@ -6,14 +6,15 @@ One rule for every game. The switches `robust` and `perturbed` are set for each 
 import math
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
-from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from ..errors import ModelError, SimulationError
+from ..errors import ExperimentError, ModelError, PlotError, SimulationError
+from ..fmu.build import GameSource
 from ..fmu.model import Model
 from ..fmu.run import Progress, Simulator
 from ..game.definition import has_expressions
 from ..game.parameters import GameParameters, game_parameters
+from ..notebook import page, paragraph, table
 from ..results.result import Result
 from ..results.unknown_term import UNKNOWN, FloatArray, recorded_for_unknown_term
 from ..theory.linearized import linearized_loop
@@ -35,6 +36,9 @@ from .claims.unperturbed_loop import (
 from .claims.verdict import Claim, Verdict
 from .claims.weights import weights_bounded
 
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
 __all__ = ["LIMIT", "Claim", "Validation", "Verdict", "validate"]
 
 LIMIT = 1000.0
@@ -43,7 +47,7 @@ LIMIT = 1000.0
 Report = Callable[[str, float], None]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Validation:
     """All claims about one FMU, with the runs that figures show."""
 
@@ -52,6 +56,43 @@ class Validation:
     notes: tuple[str, ...]  # why the neighbourhood has its size, and what else is worth knowing
     robust: Result | None  # the default experiment, robust and perturbed; None if it ended early
     plain: Result | None  # neither robust nor perturbed, until everything has decayed; None likewise
+
+    def _repr_html_(self) -> str:
+        """For notebooks: every claim with its verdict and the reason."""
+        rows = [(claim.verdict.value, claim.statement, claim.reason) for claim in self.claims]
+        notes = [paragraph(note) for note in self.notes]
+        summary = paragraph(f"{self.summary()}.")
+        return page(self.model.title, table(["verdict", "claim", "reason"], rows), *notes, summary)
+
+    def __repr__(self) -> str:
+        return f"<Validation {self.model.title}: {self.summary()}>"
+
+    def plot(self, axes: "Axes | None" = None, *, width: float = 3.5) -> "Axes":
+        """Draw the distance to the equilibrium of the runs that were judged, on a logarithmic axis.
+
+        Parameters
+        ----------
+        axes
+            Matplotlib axes to draw into; a figure of its own when left out.
+        width
+            Width of a figure of its own in inches.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+
+        Raises
+        ------
+        PlotError
+            If no run came to its end.
+        """
+        from ..results.plot import plot_error
+
+        runs = {"robust, perturbed": self.robust, "neither": self.plain}
+        ended = {label: run for label, run in runs.items() if run is not None}
+        if not ended:
+            raise PlotError("no run came to its end")
+        return plot_error(ended, axes, width=width)
 
     @property
     def passed(self) -> bool:
@@ -104,52 +145,83 @@ class Validation:
 
 
 def validate(
-    fmu: Path | str,
+    game: GameSource = None,
     *,
     limit: float = LIMIT,
     neighbourhood: float | None = None,
     progress: Report | None = None,
 ) -> Validation:
-    """Run the FMU as long as it takes and judge every claim.
+    """Judge every claim of the paper on a game, by runs as long as it takes.
 
-    limit: longest simulated time of a robust run, in s, in which it may settle.
-    neighbourhood: largest |x - x*| wanted once settled, in the game's length unit; judged as one more claim.
-    progress is called with the name of a run and the part of it done, 0 to 1.
-    Raises ModelError or SimulationError if the FMU cannot be read or loaded, SimulationError for a limit or a
-    neighbourhood that is not positive.
+    Parameters
+    ----------
+    game
+        An FMU (.fmu), a game file (.toml), a game of the package by its name, a `Game`; the paper's example
+        when left out.
+    limit
+        Longest simulated time of a robust run in s, in which it may settle.
+    neighbourhood
+        Largest |x - x*| wanted once settled, in the game's length unit: one more claim.
+    progress
+        Called with the name of a run and the part of it done, 0 to 1.
+
+    Returns
+    -------
+    Validation
+        Each claim with its verdict and the reason, and the runs that figures show.
+
+    Raises
+    ------
+    GameError, ModelError
+        For a game or FMU that is missing or is none.
+    SimulationError
+        For an FMU that cannot be loaded; for a limit or a neighbourhood that is not positive it is a
+        ValueError, too.
+
+    Examples
+    --------
+    >>> verdict = mog.validate("rivalling_pairs", limit=40.0)
+    >>> verdict.claims[0].name, verdict.claims[0].verdict.value
+    ('nash_equilibrium', 'holds')
     """
     for name, value in (("limit", limit), ("neighbourhood", neighbourhood)):
         if value is not None and not (math.isfinite(value) and value > 0.0):
-            raise SimulationError(f"{name} = {value:g} is not positive")
-    with Simulator(fmu) as simulator:
-        model = simulator.model
-        game = game_parameters(model)
-        if has_expressions(game.expressions, "cost"):
-            game = replace(game, x_star=_equilibrium_of(simulator))
-        equilibrium = nash_equilibrium_exists(game, model.path)
-        if equilibrium.verdict is Verdict.FAILS:
-            claims = [
-                equilibrium,
-                *nothing_to_observe(game, Verdict.FAILS, equilibrium.reason),
-                archive_valid(model.path),
-            ]
-            return Validation(model, tuple(claims), (), None, None)
-        spectrum = spectrum_of(game)
-        plain: Result | Ended
-        if has_expressions(game.expressions, "cost"):
-            plain, spectrum = run_until_decay_is_seen(simulator, game, spectrum, limit, progress)
-        else:
-            plain = unperturbed_run(simulator, game, spectrum, progress=progress)
-        stability = unperturbed_loop_stable(game, spectrum, _local_abscissa(simulator, game))
-        convergence = unperturbed_actions_converge(game, spectrum, plain)
-        robust = _default_experiment(simulator, game, progress)
-        observed = None
-        practical = _practical_despite(game, stability, convergence) or _unmeasured(model, game)
-        if not practical:
-            observed = observe(
-                simulator, game, slowest_rate=spectrum.slowest_rate, limit=limit, progress=progress
-            )
-            practical = practical_convergence(observed)
+            raise ExperimentError(f"{name} = {value:g} is not positive")
+    with Simulator(game) as simulator:
+        return _judged(simulator, limit, neighbourhood, progress)
+
+
+def _judged(
+    simulator: Simulator, limit: float, neighbourhood: float | None, progress: Report | None
+) -> Validation:
+    model = simulator.model
+    game = game_parameters(model)
+    if has_expressions(game.expressions, "cost"):
+        game = replace(game, x_star=_equilibrium_of(simulator))
+    equilibrium = nash_equilibrium_exists(game, model.path)
+    if equilibrium.verdict is Verdict.FAILS:
+        claims = [
+            equilibrium,
+            *nothing_to_observe(game, Verdict.FAILS, equilibrium.reason),
+            archive_valid(model.path),
+        ]
+        return Validation(model, tuple(claims), (), None, None)
+    spectrum = spectrum_of(game)
+    plain: Result | Ended
+    if has_expressions(game.expressions, "cost"):
+        plain, spectrum = run_until_decay_is_seen(simulator, game, spectrum, limit, progress)
+    else:
+        plain = unperturbed_run(simulator, game, spectrum, progress=progress)
+    stability = unperturbed_loop_stable(game, spectrum, _local_abscissa(simulator, game))
+    convergence = unperturbed_actions_converge(game, spectrum, plain)
+    robust = _default_experiment(simulator, game, progress)
+    observed = None
+    practical = _practical_despite(game, stability, convergence) or _unmeasured(model, game)
+    if not practical:
+        observed = observe(
+            simulator, game, slowest_rate=spectrum.slowest_rate, limit=limit, progress=progress
+        )
+        practical = practical_convergence(observed)
     claims = [equilibrium, *practical]
     if neighbourhood is not None:
         claims.append(within_neighbourhood(practical[0], neighbourhood))

@@ -6,6 +6,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from ..notebook import digits, folded, listed, page, table
 from .constants import LoopConstants
 from .design import Design
 from .exact_loop import ExactLoop
@@ -48,7 +49,7 @@ class Demonstration:
         return math.nan if self.seen is None else self.seen.radius(self.design.settling_time)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Analysis:
     """Everything that `mog analyse` tells."""
 
@@ -61,6 +62,29 @@ class Analysis:
     constants: LoopConstants | None  # None for games with expressions
     exact: ExactLoop | None  # None for games too large for the dense loop, or with expressions
     runs: Mapping[str, Seen]  # "robust" and "plain", with the game's own gains
+
+    def __repr__(self) -> str:
+        return f"<Analysis {self.title}: {len(self.verdicts)} verdicts>"
+
+    def _repr_html_(self) -> str:
+        """For notebooks: the verdicts, and folded every figure and hypothesis."""
+        figures = [
+            (
+                row.section,
+                row.name,
+                row.value if isinstance(row.value, str) else digits(row.value),
+                "" if row.unit == "1" else row.unit,
+                row.meaning,
+            )
+            for row in self.rows
+        ]
+        parts = [folded("Figures", table(["section", "figure", "value", "unit", "meaning"], figures))]
+        if self.hypotheses:
+            words = {True: "holds", False: "fails", None: "open"}
+            judged = [(words[each.holds], each.name, each.figures) for each in self.hypotheses]
+            told = table(["", "hypothesis", "figures"], judged)
+            parts.append(folded("Hypotheses of Theorem 1 for the given gains", told))
+        return page(self.title, listed(self.verdicts), *parts)
 
     def value(self, section: str, name: str) -> Figure:
         """The figure of one row. Raises KeyError."""

@@ -2,10 +2,15 @@
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
+from ...errors import ResultError
+from ...files.temporary import temporary_folder
+from ...fmu.build import GameSource
 from ...fmu.model import read_model
 from ...game.graphs import all_connected
 from ...interrupts import noted_signals
+from ..designs import DesignError
 from ..pool import Work, open_pool, run_cases, run_chunk
 from ..sampler import Settings
 from .definition import Sweep
@@ -21,26 +26,85 @@ PAPER_SETTLE_TIME = 16.0
 
 
 def sweep(
-    definition: Sweep,
-    output: Path | str,
+    game: GameSource | Sweep = None,
+    output: Path | str | None = None,
     *,
     jobs: int | None = None,
     scheduler: str | None = None,
     restart: bool = False,
     progress: SweepProgress | None = None,
     work: Work = run_chunk,
+    **design: Any,
 ) -> SweepResult:
-    """Run a sweep into the folder output and give its table.
+    """Run a game many times and give the table: one row a run.
 
-    Rows that the folder holds already are not run again, unless restart discards them.
-    jobs: processes on this machine; default one a usable core. Worker processes import the calling script:
-    keep the call below `if __name__ == "__main__":` there.
-    scheduler: address of a Dask scheduler, such as tcp://127.0.0.1:8786, whose workers run the rows instead.
-    work: what a worker does with a chunk of rows, a function that it can import.
-    Ctrl-C raises KeyboardInterrupt between two rows; the rows that are finished are in the folder.
-    Raises SweepError for a folder with other contents, PoolError for workers that cannot be had.
+    Parameters
+    ----------
+    game
+        An FMU (.fmu), a game file (.toml), a game of the package by its name, a `Game`; the paper's example
+        when left out.
+        Or a `Sweep`, the whole definition.
+    output
+        Folder for the rows. Rows that it holds already are not run again. Without a folder, the rows are kept
+        in memory alone.
+    jobs
+        Processes on this machine; default one a usable core. Worker processes import the calling script: keep
+        the call below `if __name__ == "__main__":` there.
+    scheduler
+        Address of a Dask scheduler, such as tcp://127.0.0.1:8786, whose workers run the rows instead.
+    restart
+        Whether the rows that the folder holds are discarded.
+    progress
+        Called with the rows finished and the rows of the sweep.
+    work
+        What a worker does with a chunk of rows, a function that it can import.
+    **design
+        What varies, as the fields of `Sweep` have it: fixed, grid, ranges, samples, sampling, graphs,
+        initial_states, initial_actions, initial_velocities, seed, settings, neighbourhood.
+
+    Returns
+    -------
+    SweepResult
+        The table, with summary, medians and heat maps.
+
+    Raises
+    ------
+    SweepError
+        For a folder with other contents.
+    PoolError
+        For workers that cannot be had.
+    VariableError, GraphError, DesignError
+        For a design that the FMU does not take or that makes no sense.
+    KeyboardInterrupt
+        By Ctrl-C, between two rows; the rows that are finished are in the folder.
+
+    Examples
+    --------
+    >>> found = mog.sweep("rivalling_pairs", grid={"k2": (0.5, 1.0, 2.0)}, jobs=1)
+    >>> found["k2"].tolist(), found["final_error"].shape
+    ([0.5, 1.0, 2.0], (3,))
     """
-    output = Path(output)
+    if isinstance(game, Sweep):
+        if design:
+            raise DesignError(f"{next(iter(design))} is given besides a definition, which has its own")
+        definition = game
+    else:
+        definition = Sweep(game, **design)
+    if output is None:
+        with temporary_folder(ResultError) as folder:
+            return _carried_out(definition, folder, jobs, scheduler, restart, progress, work)
+    return _carried_out(definition, Path(output), jobs, scheduler, restart, progress, work)
+
+
+def _carried_out(
+    definition: Sweep,
+    output: Path,
+    jobs: int | None,
+    scheduler: str | None,
+    restart: bool,  # noqa: FBT001 - as sweep has it
+    progress: SweepProgress | None,
+    work: Work,
+) -> SweepResult:
     with locked(output), noted_signals() as take_signals:
         store = Store(output, definition, restart=restart)
         finished = store.finished()
@@ -62,7 +126,7 @@ def sweep(
     return load_sweep(output)
 
 
-def connected_graphs_example(fmu: Path | str) -> Sweep:
+def connected_graphs_example(fmu: GameSource) -> Sweep:
     """The built-in example: every connected graph on the game's players, robust and perturbed.
 
     For the paper's example, 728 graphs, no run may leave |x - x*| < 0.00125 from 16 s on; for other games no

@@ -9,12 +9,12 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from functools import cached_property
 from math import prod
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ...fmu.build import GameSource
 from ...fmu.model import Model, Value, check_value, read_model
 from ...game.graphs import CommunicationGraph
 from ...version import package_version
@@ -35,7 +35,7 @@ class Sweep:
     not take, DesignError for a design that makes no sense, ModelError for an FMU that cannot be read.
     """
 
-    fmu: Path | str  # or a game, as Simulator takes
+    fmu: GameSource  # or a game, as Simulator takes
     fixed: Mapping[str, Value] = field(default_factory=dict)  # start values of every row
     grid: Mapping[str, tuple[Value, ...]] = field(default_factory=dict)  # all combinations
     ranges: Mapping[str, Range] = field(default_factory=dict)  # `samples` points drawn from them

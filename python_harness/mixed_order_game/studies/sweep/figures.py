@@ -1,5 +1,7 @@
 """Heat maps of a sweep, for a paper: medians over two varied columns, or over the edges of graphs."""
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 import pyarrow as pa
 from matplotlib.axes import Axes
@@ -9,10 +11,12 @@ from numpy.typing import NDArray
 from ...errors import PlotError, ResultError
 from ...game.graphs import graph_of_text
 from ...results.metrics import METRIC_UNITS
-from ...results.plot import COLUMN_WIDTH, new_axes, paper_style
+from ...results.style import COLUMN_WIDTH, new_axes, paper_style
 from .definition import Sweep
 from .store import schema_of
-from .table import SweepResult
+
+if TYPE_CHECKING:
+    from .table import SweepResult
 
 FloatArray = NDArray[np.float64]
 
@@ -36,7 +40,13 @@ LABELS = {
 
 
 def plot_heat_map(
-    result: SweepResult, x: str, y: str, value: str, axes: Axes | None = None, *, width: float = COLUMN_WIDTH
+    result: "SweepResult",
+    x: str,
+    y: str,
+    value: str,
+    axes: Axes | None = None,
+    *,
+    width: float = COLUMN_WIDTH,
 ) -> Axes:
     """Median of the column value over the columns x and y; grey where no run has it. width in inches.
 
@@ -78,7 +88,7 @@ def check_heat_map(definition: Sweep, x: str, y: str, value: str) -> None:
 
 
 def plot_edges(
-    result: SweepResult, value: str, axes: Axes | None = None, *, width: float = COLUMN_WIDTH
+    result: "SweepResult", value: str, axes: Axes | None = None, *, width: float = COLUMN_WIDTH
 ) -> Axes:
     """Median of the column value over the graphs that have the edge i-j, for each pair of players.
 
@@ -101,7 +111,7 @@ def plot_edges(
     return axes
 
 
-def _ends(result: SweepResult) -> set[str]:
+def _ends(result: "SweepResult") -> set[str]:
     texts = set(result.table["graph"].to_pylist())
     return {end for text in texts for edge in text.split() for end in edge.partition(":")[0].split("-")}
 

@@ -9,13 +9,15 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from ...errors import ResultError
+from ...errors import NotRecordedError, ResultError
 from ...extras import need
+from ...notebook import digits, page, table
 from ...results.metrics import METRIC_UNITS
 from .store import SweepError, read_definition, read_rows
 
 if TYPE_CHECKING:
     import pandas as pd
+    from matplotlib.axes import Axes
 
 FloatArray = NDArray[np.float64]
 
@@ -50,13 +52,58 @@ class SweepResult:
     def __getitem__(self, column: str) -> FloatArray:
         """A column of numbers, one entry a row, such as result["settling_time"]. Raises ResultError."""
         if column not in self.table.column_names:
-            raise ResultError(
+            raise NotRecordedError(
                 f"the sweep has no column {column}: it has {', '.join(self.table.column_names)}"
             )
         values = self.table[column]
         if pa.types.is_string(values.type):
             raise ResultError(f"{column} is text: it is in the table")
         return np.array([np.nan if value is None else float(value) for value in values.to_pylist()])
+
+    def _repr_html_(self) -> str:
+        """For notebooks: least, median and most of every figure."""
+        rows = [
+            (
+                each.name.replace("_", " "),
+                *map(digits, (each.least, each.median, each.most)),
+                METRIC_UNITS[each.name],
+                str(each.row_of_most) if each.count else "-",
+            )
+            for each in self.summary()
+        ]
+        header = ["figure", "least", "median", "most", "unit", "row of the most"]
+        return page(repr(self)[1:-1], table(header, rows))
+
+    def plot(
+        self, x: str, y: str, value: str = "final_error", axes: "Axes | None" = None, *, width: float = 3.5
+    ) -> "Axes":
+        """Draw the median of a figure over two columns as a heat map.
+
+        Parameters
+        ----------
+        x, y
+            Columns that vary in the sweep, such as "k1".
+        value
+            The figure, one of the columns after them, such as "settling_time".
+        axes
+            Matplotlib axes to draw into; a figure of its own when left out.
+        width
+            Width of a figure of its own in inches.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+
+        Raises
+        ------
+        ResultError
+            For a column that does not exist.
+        PlotError
+            If x or y does not vary.
+        """
+        from .figures import plot_heat_map
+
+        return plot_heat_map(self, x, y, value, axes, width=width)
 
     @property
     def rows(self) -> int:

@@ -1,0 +1,42 @@
+"""Under which heading an option stands in help: the same one in every command."""
+
+import inspect
+from collections.abc import Callable
+from typing import get_args
+
+from typer.models import OptionInfo
+
+PANELS = {
+    "The game": (
+        "baselines", "dimension", "disturbance", "example", "fmu", "graph", "graph_schedule",
+        "group", "linear_disturbance", "orders", "player", "players", "settings", "square", "title",
+        "variants",
+    ),
+    "What is varied": (
+        "design", "gains", "graphs", "grid", "initial_actions", "initial_states",
+        "initial_velocities", "ranges", "samples", "seed",
+    ),
+    "The run": (
+        "jobs", "limit", "restart", "scheduler", "simulation", "start_time", "step", "stop_time",
+        "tolerance",
+    ),
+    "What it is judged by": (
+        "band", "claims", "largest_error", "neighbourhood", "radius", "settle_time",
+        "settling_time", "strict",
+    ),
+    "What is written": (
+        "arm_linux", "as_json", "figure", "file_format", "force", "heat_maps", "output",
+        "schema", "tables", "variables", "width",
+    ),
+}  # fmt: skip
+"""Options by their parameters' names; others, --help among them, stand under Options."""
+
+
+def grouped(command: Callable[..., None]) -> Callable[..., None]:
+    """The command, its options put under their headings."""
+    headings = {name: heading for heading, names in PANELS.items() for name in names}
+    for name, parameter in inspect.signature(command).parameters.items():
+        for each in get_args(parameter.annotation)[1:]:
+            if isinstance(each, OptionInfo) and name in headings:
+                each.rich_help_panel = headings[name]
+    return command
