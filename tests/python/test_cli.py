@@ -217,13 +217,22 @@ def test_plot_of_game_and_results(fmu: Path, tmp_path: Path) -> None:
         "velocities_unperturbed.svg",
         "error.svg",
         "plane.svg",
+        "graph.svg",
+        "control.svg",
+        "weights.svg",
+        "estimates.svg",
     }
-    for suffix in ("csv", "parquet"):
+    for suffix, kinds in (("csv", 7), ("parquet", 8)):  # a CSV file does not hold the graph
         run = tmp_path / f"run.{suffix}"
         assert mog("run", fmu, "--stop-time", 2, "--output", run).exit_code == 0
         drawn = mog("plot", run, "--output", tmp_path / suffix, "--format", "png", "--width", "page")
         assert drawn.exit_code == 0, drawn.output
-        assert len(list((tmp_path / suffix).iterdir())) == 4
+        assert len(list((tmp_path / suffix).iterdir())) == kinds
+    options = ("--output", tmp_path / "few", "--kind", "error", "--kind", "control", "--until", 0.5)
+    few = mog("plot", fmu, *options)
+    assert [Path(line).name for line in few.stdout.splitlines()] == ["error.pdf", "control.pdf"]
+    assert mog("plot", fmu, "--kind", "pie").exit_code == 2
+    assert "nothing to draw until -1 s" in sentence(mog("plot", run, "--until", -1))
     sentence(mog("plot", tmp_path / "none.csv"))
 
 

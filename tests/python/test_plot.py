@@ -9,6 +9,9 @@ from matplotlib.axes import Axes
 
 from mixed_order_game import PlotError, Result, ResultError
 from mixed_order_game.results import plot
+from mixed_order_game.results.error_figure import BELOW_FLOOR, integrator_floor
+from mixed_order_game.results.plane_figure import EARLIER
+from mixed_order_game.results.style import PALETTE
 
 T, N = 400, 5
 ORDER = (1, 1, 1, 2, 2)
@@ -113,10 +116,11 @@ def test_the_equilibrium_is_drawn_as_it_was_at_each_time() -> None:
     crosses = {
         str(line.get_color()): np.asarray(line.get_xydata())
         for line in plane.lines
-        if line.get_marker() == "x"
+        if str(line.get_marker()) in "xX"
     }
-    np.testing.assert_array_equal(crosses[plot.EARLIER], [[-0.5, -0.5]])
-    assert [1.0, 1.0] in crosses["black"].tolist()
+    np.testing.assert_array_equal(crosses[EARLIER], [[-0.5, -0.5]])
+    np.testing.assert_array_equal(crosses["black"], [[-0.5, -0.5]])  # where four players' equilibria meet
+    np.testing.assert_array_equal(crosses[PALETTE[1]], [[1.0, 1.0]])
     assert "equilibrium before" in legend_texts(plane)
     assert "equilibrium before" not in legend_texts(plot.plot_plane(make()))
 
@@ -124,13 +128,14 @@ def test_the_equilibrium_is_drawn_as_it_was_at_each_time() -> None:
 def test_errors_within_the_tolerance_are_shaded() -> None:
     """The floor is |tolerance |x*| + absolute tolerance|, ten entries of 0.5e-8 + 1e-10."""
     result = replace(make(), tolerance=1e-8)
-    floor = plot.integrator_floor(result)
+    floor = integrator_floor(result)
     assert floor == pytest.approx(np.sqrt(10.0) * 5.1e-9)
     other = replace(result, parameters={"tolerance_relative": 1e-6, "tolerance_absolute": 1e-3})
-    assert plot.integrator_floor(other) == pytest.approx(np.sqrt(10.0) * (0.5e-6 + 1e-3))
+    assert integrator_floor(other) == pytest.approx(np.sqrt(10.0) * (0.5e-6 + 1e-3))
     axes = plot.plot_error({"above": replace(make(stop=1.0), tolerance=1e-8), "below": result})
-    assert legend_texts(axes) == ["above", "below", "integrator's tolerance"]
-    assert axes.get_ylim()[0] == pytest.approx(plot.BELOW_FLOOR * floor)
+    assert legend_texts(axes) == ["above", "below"]
+    assert [text.get_text() for text in axes.texts] == ["within the integrator's tolerance"]
+    assert axes.get_ylim()[0] == pytest.approx(BELOW_FLOOR * floor)
     (shade,) = axes.patches
     assert shade.get_extents().transformed(axes.transData.inverted()).y1 == pytest.approx(floor)
     assert len(plot.plot_error(make()).patches) == 0  # of an unknown tolerance nothing is shaded
@@ -139,19 +144,23 @@ def test_errors_within_the_tolerance_are_shaded() -> None:
 def test_a_result_is_drawn_as_far_as_it_goes() -> None:
     """What was not recorded has no figure, and is not said not to exist."""
     whole = replace(make(), parameters={"v0[4,1]": 0.0, "k1": 1.0})
-    assert list(plot.result_figures(whole)) == ["positions", "velocities", "error", "plane"]
+    drawn = ["positions", "velocities", "error", "plane", "control"]
+    assert list(plot.result_figures(whole)) == drawn
     for left_out, kept in (
-        ("v", ["positions", "error", "plane"]),
-        ("x", ["velocities", "error"]),
-        ("nash_error", ["positions", "velocities", "plane"]),
+        ("v", ["positions", "error", "plane", "control"]),
+        ("x", ["velocities", "error", "control"]),
+        ("nash_error", ["positions", "velocities", "plane", "control"]),
     ):
         part = {name: each for name, each in whole.columns.items() if name.split("[")[0] != left_out}
         assert list(plot.result_figures(replace(whole, columns=part))) == kept
-    bare = {name: each for name, each in whole.columns.items() if name.startswith(("u", "x_star"))}
+    assert list(plot.result_figures(whole, ["error"])) == ["error"]
+    with pytest.raises(ResultError, match="W_norm2 was not recorded"):
+        plot.result_figures(whole, ["weights"])
+    bare = {name: each for name, each in whole.columns.items() if name.startswith("x_star")}
     with pytest.raises(ResultError, match="v was not recorded"):
         plot.plot_velocities(replace(whole, columns=bare))
     with pytest.raises(ResultError, match="nothing to draw"):
-        plot.result_figures(replace(whole, columns=bare))
+        plot.result_figures(replace(whole, columns=bare, parameters={"v0[4,1]": 0.0}))
 
 
 def test_inset_enlarges_a_short_transient_and_covers_no_settled_curve() -> None:
@@ -176,14 +185,13 @@ def test_axes_of_the_caller_are_used() -> None:
 
 
 def test_paper_figures() -> None:
-    four = ["positions_robust", "velocities_robust", "positions_unperturbed", "velocities_unperturbed"]
+    four = ["positions_robust", "positions_unperturbed", "velocities_robust", "velocities_unperturbed"]
     assert list(plot.paper_figures(make(), make(stop=5.0))) == [*four, "error", "plane"]
     assert list(plot.paper_figures(make(ALL_FIRST, 1), make(ALL_FIRST, 1))) == [
         "positions_robust",
         "positions_unperturbed",
         "error",
     ]
-    assert list(plot.result_figures(make())) == ["positions", "velocities", "error", "plane"]
 
 
 def test_many_players_are_not_named_one_by_one() -> None:

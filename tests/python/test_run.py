@@ -370,3 +370,15 @@ def test_fmu_for_another_machine(fmu: Path, tmp_path: Path) -> None:
             target.writestr(name.replace("linux64", "vax"), source.read(name))
     with pytest.raises(SimulationError, match="cannot be loaded"):
         Simulator(other)
+
+
+def test_a_fine_start_adds_samples_and_changes_none(fmu: Path) -> None:
+    plain = run(fmu, stop_time=2.0, tolerance=1e-9)
+    fine = run(fmu, stop_time=2.0, tolerance=1e-9, fine_start=True)
+    assert np.isin(plain.time, fine.time).all()
+    assert fine.time[1] == pytest.approx(2e-6)
+    assert len(fine.time) > len(plain.time) + 200
+    shared = np.isin(fine.time, plain.time)
+    np.testing.assert_allclose(fine.x[shared], plain.x, atol=1e-6)
+    late = run(fmu, start_time=1.76e9, stop_time=1.76e9 + 1.0, fine_start=True)
+    assert np.diff(late.time).min() > 0.0

@@ -49,6 +49,13 @@ def complete_graphs(incomplete: str) -> list[str]:
     return [kind for kind in GRAPH_KINDS if kind.startswith(incomplete)]
 
 
+def complete_kind(incomplete: str) -> list[str]:
+    """Kinds of figures."""
+    from ..results.plot import KINDS
+
+    return [kind for kind in KINDS if kind.startswith(incomplete)]
+
+
 def _named(incomplete: str, suffixes: Iterable[str]) -> list[str]:
     from ..fmu.build import shipped_games
 

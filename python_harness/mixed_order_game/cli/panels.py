@@ -25,8 +25,8 @@ PANELS = {
         "settling_time", "strict",
     ),
     "What is written": (
-        "arm_linux", "as_json", "figure", "file_format", "force", "heat_maps", "output",
-        "schema", "tables", "variables", "width",
+        "arm_linux", "as_json", "figure", "file_format", "force", "heat_maps", "kinds", "output",
+        "schema", "tables", "until", "variables", "width",
     ),
 }  # fmt: skip
 """Options by their parameters' names; others, --help among them, stand under Options."""

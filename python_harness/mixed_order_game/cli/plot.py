@@ -1,14 +1,17 @@
 """The command `mog plot`: parses options and prints."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Sequence
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .completion import complete_source
+from .completion import complete_kind, complete_source
 from .options import FigureFormat, ForceOption, output_option
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 
 class FigureWidth(StrEnum):
@@ -34,31 +37,37 @@ def plot(
     width: Annotated[
         FigureWidth, typer.Option(case_sensitive=False, help="Width in a two-column paper.")
     ] = FigureWidth.COLUMN,
+    kinds: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--kind",
+            metavar="KIND",
+            help="positions, velocities, error, plane, graph, control, weights or estimates; repeatable; "
+            "all of them when left out.",
+            autocompletion=complete_kind,
+        ),
+    ] = None,
+    until: Annotated[
+        float | None, typer.Option(help="Draw the run up to this time in s.", show_default="its end")
+    ] = None,
     force: ForceOption = False,
 ) -> None:
-    """Draw the figures of a result, or of a game the paper's four, the error and the paths in the plane.
+    """Draw the figures of a result; of a game the paper's four and those of a robust, perturbed run.
 
     [bold]Examples:[/bold]
 
     mog plot --output figures --format svg
 
-    mog plot result.parquet --width page
+    mog plot result.parquet --width page --kind positions --kind control --until 2
     """
     from ..files.writing import FIGURE, RESULT
-    from ..fmu.build import SOURCE_OR_RESULT, fmu_of
-    from ..fmu.run import Simulator
-    from ..results.plot import (
-        COLUMN_WIDTH,
-        PAGE_WIDTH,
-        paper_figure_names,
-        paper_figures,
-        result_figures,
-        save_figure,
-    )
+    from ..results.plot import COLUMN_WIDTH, KINDS, PAGE_WIDTH, cut, result_figures, save_figure
     from ..results.result import load
-    from ..studies.claims.tolerances import PLAIN_TOLERANCE, TOLERANCE
 
     inches = PAGE_WIDTH if width is FigureWidth.PAGE else COLUMN_WIDTH
+    for kind in kinds or []:
+        if kind not in KINDS:
+            raise typer.BadParameter(f"{kind!r} is none of {', '.join(KINDS)}", param_hint="--kind")
 
     def judged(names: Iterable[str]) -> dict[str, Path]:
         paths = {name: output / f"{name}.{file_format.value}" for name in names}
@@ -67,19 +76,40 @@ def plot(
         return paths
 
     if source is not None and RESULT.takes(source):
-        figures = result_figures(load(source), width=inches)
+        result = load(source)
+        figures = result_figures(result if until is None else cut(result, until), kinds, width=inches)
         paths = judged(figures)
     else:
-        with Simulator(fmu_of(source, SOURCE_OR_RESULT)) as simulator:
-            paths = judged(paper_figure_names(simulator.model))
-            robust, plain = (
-                simulator.run(
-                    start_values={"robust": on, "perturbed": on},
-                    stop_time=simulator.model.stop_time,
-                    tolerance=tolerance,
-                )
-                for on, tolerance in ((True, TOLERANCE), (False, PLAIN_TOLERANCE))
-            )
-        figures = paper_figures(robust, plain, width=inches)
+        figures, paths = _figures_of_game(source, kinds or list(KINDS), until, inches, judged)
     for name, axes in figures.items():
         typer.echo(save_figure(axes, paths[name], force=force))
+
+
+def _figures_of_game(
+    source: Path | None,
+    kinds: Sequence[str],
+    until: float | None,
+    width: float,
+    judged: Callable[[Iterable[str]], dict[str, Path]],
+) -> "tuple[dict[str, Axes], dict[str, Path]]":
+    """Figures of a robust, perturbed run and of one that is neither, and their files, judged before both."""
+    from ..fmu.build import SOURCE_OR_RESULT, fmu_of
+    from ..fmu.run import Simulator
+    from ..results.plot import paper_figure_names, paper_figures
+    from ..results.time_figures import MOST_ESTIMATING
+    from ..studies.claims.tolerances import PLAIN_TOLERANCE, TOLERANCE
+
+    with Simulator(fmu_of(source, SOURCE_OR_RESULT)) as simulator:
+        model = simulator.model
+        paths = judged(paper_figure_names(model, kinds))
+        robust, plain = (
+            simulator.run(
+                start_values={"robust": on, "perturbed": on},
+                stop_time=model.stop_time if until is None else until,
+                tolerance=tolerance,
+                outputs=model.signals(estimates=on and model.players <= MOST_ESTIMATING),
+                fine_start=True,
+            )
+            for on, tolerance in ((True, TOLERANCE), (False, PLAIN_TOLERANCE))
+        )
+    return paper_figures(robust, plain, kinds, width=width), paths

@@ -155,6 +155,21 @@ class Model:
         """Variables of one kind by their 1-based indices: indexed("x")[1, 2] is x[1,2]; empty if none."""
         return self._groups.get(stem, {})
 
+    def signals(self, *, estimates: bool = False) -> list[str]:
+        """Names of what a run records unless told otherwise: outputs, locals and x_star.
+
+        Left out are the weights W, all time derivatives and, unless wanted, the estimates y.
+        """
+        left_out = ("W",) if estimates else ("W", "y")
+        return [
+            variable.name
+            for variable in self.variables.values()
+            if variable.causality in ("output", "local", "calculatedParameter")
+            and variable.variability != "constant"
+            and parse_name(variable.name)[0] not in left_out
+            and not variable.name.startswith("der(")
+        ]
+
     def variable(self, name: str) -> Variable:
         """The variable of that name. Raises VariableError naming the nearest ones."""
         if name not in self.variables:

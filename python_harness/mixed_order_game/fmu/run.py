@@ -59,8 +59,8 @@ Progress = Callable[[float], None]
 _loading = Lock()
 
 LARGEST_SAMPLES = 10_000_000
-LEFT_OUT = ("y", "W")
-"""Estimates and weights: N^2 D and N q D columns, recorded only when asked for, like all time derivatives."""
+FINE_STEPS, FINE_SAMPLES, FINEST = 50, 300, 1e-4
+"""Of a fine start: regular steps that it spans, its samples, and the first of them in regular steps."""
 
 
 def run(
@@ -75,6 +75,7 @@ def run(
     inputs: Inputs | None = None,
     changes: Changes | None = None,
     progress: Progress | None = None,
+    fine_start: bool = False,
 ) -> Result:
     """Run a game once, from start to stop, and sample it.
 
@@ -108,6 +109,9 @@ def run(
         begins at its time. A sample at the time of a change is taken before it.
     progress
         Called with the time reached, in s, after every step.
+    fine_start
+        Whether the first steps are sampled on a geometric grid besides, from a ten-thousandth of a step on,
+        for figures that show how the control begins.
 
     Returns
     -------
@@ -143,6 +147,7 @@ def run(
             inputs=inputs,
             changes=changes,
             progress=progress,
+            fine_start=fine_start,
         )
 
 
@@ -246,6 +251,7 @@ class Simulator:
         inputs: Inputs | None = None,
         changes: Changes | None = None,
         progress: Progress | None = None,
+        fine_start: bool = False,
     ) -> Result:
         """Run from start_time to stop_time and sample every step, both ends included.
 
@@ -278,6 +284,9 @@ class Simulator:
             that begins at its time. A sample at the time of a change is taken before it.
         progress
             Called with the time reached, in s, after every step.
+        fine_start
+            Whether the first steps are sampled on a geometric grid besides, from a ten-thousandth of a step
+            on, for figures that show how the control begins.
 
         Returns
         -------
@@ -302,6 +311,8 @@ class Simulator:
             )
         )
         time = _samples(start_time, stop_time, step)
+        if fine_start:
+            time = _with_fine_start(time)
         if not (np.isfinite(tolerance) and 0.0 < tolerance < 1.0):
             raise ExperimentError(f"tolerance = {tolerance:g} is not between 0 and 1")
         start = self.model.expanded(start_values or {})
@@ -486,15 +497,7 @@ class Simulator:
             outputs = split_names(outputs)
         if outputs is not None:
             return self.model.select([*outputs, "x_star"])
-        left_out = {variable.name for stem in LEFT_OUT for variable in self.model.indexed(stem).values()}
-        left_out |= {name for name in self.model.variables if name.startswith("der(")}
-        return [
-            variable
-            for variable in self.model.variables.values()
-            if variable.causality in ("output", "local", "calculatedParameter")
-            and variable.variability != "constant"
-            and variable.name not in left_out
-        ]
+        return [self.model.variable(name) for name in self.model.signals()]
 
     def _log(self, _: object, _name: bytes, status: int, _category: bytes, message: bytes) -> None:
         text = message.decode("utf-8", errors="replace")
@@ -680,6 +683,17 @@ def _samples(start: float, stop: float, step: float) -> NDArray[np.float64]:
     if np.diff(times).min() <= 0.0:
         raise ExperimentError(f"step = {step:g} s is below the resolution of times at {in_seconds(stop)}")
     return times
+
+
+def _with_fine_start(time: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The samples and, before the FINE_STEPS-th, a geometric grid; as far as the times resolve it."""
+    begin, step = time[0], time[1] - time[0]
+    last = min(FINE_STEPS, len(time) - 1)
+    grid = begin + np.geomspace(FINEST * step, time[last] - begin, FINE_SAMPLES)[:-1]
+    after = np.searchsorted(time, grid, side="right")
+    apart = 10.0 * np.spacing(np.abs(time).max()) + 1e-9 * step
+    clear = (grid - time[after - 1] > apart) & (time[after] - grid > apart)
+    return np.union1d(time, grid[clear])
 
 
 def _schedule(model: Model, changes: Changes, samples: NDArray[np.float64]) -> dict[float, dict[str, Value]]:

@@ -12,8 +12,8 @@ from ..fmu.model import Model, Value
 from ..fmu.run import Simulator
 from ..game.definition import has_expressions
 from ..game.parameters import GameParameters, game_parameters
-from ..names import parse_name
 from ..results.result import Result
+from ..results.time_figures import MOST_ESTIMATING
 from ..results.unknown_term import UNKNOWN, recorded_for_unknown_term, unknown_term
 from ..studies.claims.tolerances import PLAIN_TOLERANCE, TOLERANCE
 from ..studies.claims.unperturbed_loop import LARGEST_LINEAR_LOOP
@@ -23,9 +23,6 @@ from ..theory.spectrum import linear_loop, spectral_abscissa
 from ..times import in_seconds
 
 FloatArray = NDArray[np.float64]
-
-MOST_ESTIMATING = 12
-"""Most players whose estimates, N^2 D signals, are recorded and drawn."""
 
 ON_SPHERE = 1e-9
 """Relative distance of w'w from W_max within which a column counts as on the sphere."""
@@ -105,9 +102,7 @@ def evidence_of_game(
                 stop_time=stop,
                 step=model.step,
                 tolerance=tolerance,
-                outputs=[*_signals(model, estimates=estimates), *(rates or [])]
-                if estimates or rates
-                else None,
+                outputs=[*model.signals(estimates=estimates), *(rates or [])] if estimates or rates else None,
                 progress=None if progress is None else lambda time: progress(name, time / stop),
             )
 
@@ -186,15 +181,3 @@ def energy_so_far(result: Result) -> FloatArray:
     power = np.sum(result.u**2, axis=2)
     steps = 0.5 * (power[1:] + power[:-1]) * np.diff(result.time)[:, np.newaxis]
     return np.vstack([np.zeros(power.shape[1]), np.cumsum(steps, axis=0)])
-
-
-def _signals(model: Model, *, estimates: bool) -> list[str]:
-    """Every output and local but weights and derivatives, and the estimates unless wanted."""
-    return [
-        variable.name
-        for variable in model.variables.values()
-        if variable.causality in ("output", "local")
-        and variable.variability != "constant"
-        and parse_name(variable.name)[0] not in (("W",) if estimates else ("W", "y"))
-        and not variable.name.startswith("der(")
-    ]

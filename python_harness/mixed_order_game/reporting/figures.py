@@ -16,10 +16,12 @@ from numpy.typing import NDArray
 
 from ..errors import ResultError
 from ..names import indices_of
+from ..results.error_figure import BELOW_FLOOR, integrator_floor
 from ..results.graph_figure import edges_of
-from ..results.plot import BELOW_FLOOR, SMALLEST_ERROR, earlier_equilibria, integrator_floor
+from ..results.plane_figure import earlier_equilibria
 from ..results.result import Result
 from ..results.style import PALETTE
+from ..results.time_figures import SMALLEST
 from .evidence import Evidence, energy_so_far, shared_signal, sphere_switches, weight_bound
 
 FloatArray = NDArray[np.float64]
@@ -495,7 +497,7 @@ def _line(
 
 def _positive(time: FloatArray, values: FloatArray, name: str, colour: str) -> Trace:
     """A line on a logarithmic axis, which has no 0."""
-    return _line(time, np.maximum(values, SMALLEST_ERROR), name, colour)
+    return _line(time, np.maximum(values, SMALLEST), name, colour)
 
 
 def _shade(evidence: Evidence, signal: str, copies: int, data: list[Trace], layout: dict[str, Any]) -> str:

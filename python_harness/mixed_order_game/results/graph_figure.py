@@ -22,6 +22,9 @@ SECOND_ORDER = 2
 LARGEST_CIRCLE = 12
 """Most players that stand on a circle; more are placed so that edges are short."""
 
+FULL_WIDTH = 60
+"""Edges up to which they are drawn in full width."""
+
 MOST_NAMED = 60
 """Most players whose numbers are written."""
 
@@ -41,6 +44,7 @@ def plot_graph(
     """
     places = _places(len(order), edges)
     largest = max((weight for _, _, weight in edges), default=1.0)
+    thin = min(1.0, FULL_WIDTH / max(len(edges), 1))
     size = float(np.clip(36.0 / np.sqrt(len(order)), 2.5, 14.0)) * min(1.0, width / COLUMN_WIDTH)
     with paper_style():
         axes = axes or new_axes(width, height=0.85 * width)
@@ -53,7 +57,8 @@ def plot_graph(
                     "arrowstyle": "-|>" if directed else "-",
                     "connectionstyle": "arc3,rad=0.12" if directed else "arc3",
                     "color": "0.55",
-                    "linewidth": 0.3 + 0.9 * weight / largest,
+                    "alpha": 0.4 + 0.6 * thin,
+                    "linewidth": (0.3 + 0.9 * weight / largest) * np.sqrt(thin),
                     "shrinkA": 0.5 * size,
                     "shrinkB": 0.5 * size,
                 },

@@ -20,8 +20,8 @@ TWO_COLUMNS = 5.0
 
 PALETTE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#F0E442")
 LINE_STYLES: tuple[Literal["-", "--", ":", "-."], ...] = ("-", "--", ":", "-.")
-LARGEST_LEGEND = 10
-"""Most players that are named one by one."""
+MAP, MAP_END = mpl.colormaps["viridis"], 0.95
+"""Colours of more players than the palette has, perceptually even, and the part of them that is used."""
 
 STYLE: Mapping[str, Any] = {
     "font.size": 8.0,
@@ -63,7 +63,7 @@ def colours(count: int) -> Sequence[Any]:
     """One a player: the palette, or a perceptually even map if it does not suffice."""
     if count <= len(PALETTE):
         return PALETTE[:count]
-    return [mpl.colormaps["viridis"](value) for value in np.linspace(0.0, 0.95, count)]
+    return [MAP(value) for value in np.linspace(0.0, MAP_END, count)]
 
 
 def width_of(axes: Axes) -> float:

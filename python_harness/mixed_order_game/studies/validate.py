@@ -258,6 +258,7 @@ def _default_experiment(
             step=model.step,
             tolerance=TOLERANCE,
             progress=follow,
+            fine_start=True,
         )
 
     def report(time: float) -> None:
