@@ -6,6 +6,10 @@
 // nothing but the last restart point (time, state, modes, parameters, inputs): communication points leave no trace, and
 // a checkpoint is that restart point plus the count of steps since.
 //
+// Where inputs or parameters change at one communication point after the other, CVODE would begin anew at order 1 each
+// time. The time up to the next one is then gone by Rosenbrock steps, which end there: a restart point, whatever
+// follows.
+//
 // All times here are seconds since the loop's time origin: where a run begins there, the resolution of its times does
 // not depend on the date.
 #pragma once
@@ -42,7 +46,8 @@ struct Checkpoint {
   Modes restart_modes;
   Statistics restart_statistics;
   std::int64_t steps_since_restart = 0;
-  Real time = 0.0;  ///< communication point at which it was taken
+  Real first_step = 0.0;  ///< to try after the next change [s]; 0 when nothing is known of it
+  Real time = 0.0;        ///< communication point at which it was taken
   AlignedVector state;
   Modes modes;
   Statistics statistics;
@@ -59,7 +64,8 @@ class Integrator {
   /// Begins a run at time t with the loop's initial state.
   void start(Real t, Tolerances tolerances);
 
-  /// Restarts at the present time because parameters, or only inputs, changed.
+  /// Restarts at the present time because parameters, or only inputs, changed. When the last restart was a few steps
+  /// ago, the next call of advance() takes Rosenbrock steps.
   void restart(bool parameters_changed = true);
 
   /// Moves to time t_end >= time(). Throws IntegrationError with the time reached and the reason; the present time and

@@ -68,6 +68,7 @@ const Kernels MIXED_ORDER_GAME_JOIN(kernels_, MIXED_ORDER_GAME_LEVEL) = {
     predict_back,
     newton_residual,
     add_correction,
+    combine_stages,
 };
 
 }  // namespace mixed_order_game

@@ -72,3 +72,19 @@ void add_correction(std::int64_t n, double scale_of, const double* delta, const 
     return load_as<Width>(correction + k) + scale_of * load_as<Width>(delta + k);
   });
 }
+
+void combine_stages(std::int64_t n, int count, const double* a, const double* c, const double* const* stage,
+                    const double* state, double b, const double* rate, double* point, double* rhs) {
+  for_columns(n, [=](auto width, Index p) __attribute__((always_inline)) {
+    using Width = decltype(width);
+    Width y = load_as<Width>(state + p);
+    Width sum = b * load_as<Width>(rate + p);
+    for (int j = 0; j < count; ++j) {
+      const Width U = load_as<Width>(stage[j] + p);
+      y += a[j] * U;
+      sum += c[j] * U;
+    }
+    store(y, point + p);
+    store(sum, rhs + p);
+  });
+}

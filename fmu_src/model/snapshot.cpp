@@ -13,7 +13,7 @@ namespace mixed_order_game {
 namespace {
 
 constexpr std::string_view magic = "MOGstate";
-constexpr std::uint32_t format = 3;
+constexpr std::uint32_t format = 4;
 constexpr std::size_t fingerprint_size = 16;
 
 class Writer {
@@ -144,6 +144,7 @@ void write_co_simulation(Writer& writer, const CoSimulation::Point& point) {
   write_modes(writer, checkpoint.restart_modes);
   write_statistics(writer, checkpoint.restart_statistics);
   writer.number(checkpoint.steps_since_restart);
+  writer.number(checkpoint.first_step);
   writer.number(checkpoint.time);
   writer.numbers(checkpoint.state);
   write_modes(writer, checkpoint.modes);
@@ -221,6 +222,8 @@ Checkpoint read_checkpoint(Reader& reader, const SnapshotShape& shape) {
   read_statistics(reader, checkpoint.restart_statistics);
   checkpoint.steps_since_restart = read_count(reader);
   if (checkpoint.steps_since_restart > shape.steps) Reader::refuse("it counts too many steps");
+  checkpoint.first_step = reader.real();
+  if (checkpoint.first_step < 0.0) Reader::refuse("a step in it is negative");
   checkpoint.time = reader.real();
   reader.numbers(shape.states, checkpoint.state);
   read_modes(reader, *shape.parameters, checkpoint.modes);
@@ -247,7 +250,7 @@ std::size_t serialized_size(const Snapshot& snapshot, std::string_view guid) {
     const auto& [acting, time, checkpoint] = *snapshot.co_simulation;
     constexpr std::size_t statistics = 5 * 8;
     size += 8 + 8 * acting.size() + 8 + 8;
-    size += 8 + 8 * checkpoint.restart_state.size() + size_of(checkpoint.restart_modes) + statistics + 8;
+    size += 8 + 8 * checkpoint.restart_state.size() + size_of(checkpoint.restart_modes) + statistics + 8 + 8;
     size += 8 + 8 + 8 * checkpoint.state.size() + size_of(checkpoint.modes) + statistics;
   }
   if (snapshot.model_exchange) {

@@ -290,6 +290,76 @@ TEST(Integrator, AnInputActsFromTheRestartOn) {
   EXPECT_NEAR(run.state()[13] - before[13], 0.1, 0.02);
 }
 
+/// Inputs that jump every 20 ms, here and there by much.
+void push(Simulation& run, int k) {
+  for (int p = 0; p < run.loop.shape().own_entries(); ++p) {
+    run.input.set_value(p, std::sin(0.04 * k + p) + (k % 17 == 0 ? 5.0 : 0.0));
+  }
+  run.integrator.restart(false);
+}
+
+TEST(Integrator, FollowsInputsThatChangeAgainAndAgain) {
+  struct Case {
+    std::string game;
+    Real x, W;  // bounds of the errors, about those of CVODE's own starts
+  };
+  for (const Case& test :
+       {Case{paper_game, 2e-3, 1e-2}, Case{busy_game, 2e-3, 1e-2}, Case{switching_game, 5e-3, 5e-2}}) {
+    SCOPED_TRACE(test.game);
+    Simulation run(text_of(test.game));
+    Simulation exact(text_of(test.game));
+    run.integrator.start(0.0, {1e-6, 1e-8});
+    exact.integrator.start(0.0, {1e-11, 1e-13});  // by CVODE alone
+    const int weights = run.loop.layout().weights();
+    for (int k = 1; k <= 100; ++k) {
+      for (Simulation* each : {&run, &exact}) {
+        if (k > 1) push(*each, k);
+        each->integrator.advance(0.02 * k);
+      }
+      for (int p = 0; p < run.loop.layout().size(); ++p) {
+        ASSERT_NEAR(run.state()[at(p)], exact.state()[at(p)], p < weights ? test.x : test.W) << p << " at " << k;
+      }
+    }
+    EXPECT_EQ(run.integrator.statistics().events, exact.integrator.statistics().events);
+  }
+}
+
+TEST(Integrator, RestoresCheckpointsBetweenChangesBitForBit) {
+  const Tolerances tolerances{1e-6, 1e-8};
+  for (const std::string& game : {paper_game, busy_game, switching_game}) {
+    SCOPED_TRACE(game);
+    Simulation run(text_of(game));
+    std::vector<Checkpoint> checkpoints;
+    std::vector<std::vector<Real>> states;
+    std::vector<Statistics> statistics;
+    std::vector<std::vector<Real>> inputs;
+    const auto go = [&](Simulation& each, int k) {
+      if (k % 7 < 5) push(each, k);  // two intervals of seven without a change
+      each.integrator.advance(0.02 * k);
+    };
+    run.integrator.start(0.0, tolerances);
+    for (int k = 1; k <= 60; ++k) {
+      go(run, k);
+      checkpoints.push_back(run.integrator.checkpoint());
+      states.push_back(run.state());
+      statistics.push_back(run.integrator.statistics());
+      inputs.emplace_back(run.input.numbers().begin(), run.input.numbers().end());
+    }
+    for (const std::size_t from : {0U, 33U, 5U, 20U, 58U}) {
+      Simulation fresh(text_of(game));
+      for (Simulation* other : {&run, &fresh}) {
+        other->input.set_numbers(inputs[from]);
+        EXPECT_TRUE(other->integrator.restore(checkpoints[from], tolerances)) << from;
+        for (std::size_t k = from + 1; k < 60; ++k) {
+          go(*other, static_cast<int>(k) + 1);
+          ASSERT_TRUE(same_bits(other->state(), states[k])) << "from " << from << " to " << k;
+          ASSERT_EQ(other->integrator.statistics(), statistics[k]) << "from " << from << " to " << k;
+        }
+      }
+    }
+  }
+}
+
 TEST(Integrator, DoesNotChatterOnTheSphere) {
   // the sign of e, which decides where columns leave, is below the tolerance
   std::string paper = text_of(paper_game);

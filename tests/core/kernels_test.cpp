@@ -687,6 +687,32 @@ TEST(Vectors, MakeAStepOfNewtonsIteration) {
   }
 }
 
+TEST(Vectors, CombineTheStagesOfAStep) {
+  RandomNumbers random(19);
+  for (const int n : sizes) {
+    for (const int count : {0, 1, 7}) {
+      const Array a(8, random), c(8, random), state(n, random), rate(n, random), stages(7 * n, random);
+      std::array<const double*, 7> stage{};
+      for (int j = 0; j < 7; ++j) stage[static_cast<std::size_t>(j)] = stages + j * n;
+      const Array both = on_every_level([&](const Kernels& kernel) {
+        Array out(2 * n, 9.0);
+        kernel.combine_stages(n, count, a, c, stage.data(), state, 0.4, rate, out, out + n);
+        return out;
+      });
+      for (int k = 0; k < n; ++k) {
+        double point = state[k];
+        double rhs = 0.4 * rate[k];
+        for (int j = 0; j < count; ++j) {
+          point += a[j] * stages[j * n + k];
+          rhs += c[j] * stages[j * n + k];
+        }
+        EXPECT_NEAR(both[k], point, 1e-14);
+        EXPECT_NEAR(both[n + k], rhs, 1e-14);
+      }
+    }
+  }
+}
+
 TEST(Vectors, ArePredictedByPascalsTriangle) {
   RandomNumbers random(18);
   for (const int n : sizes) {

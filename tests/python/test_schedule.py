@@ -154,6 +154,28 @@ def test_every_row_acts_between_two_samples(fmu: Path, tmp_path: Path, model: Mo
     assert late.x[-1, 0, 0] - without.x[-1, 0, 0] > 3.0  # the row before the start is in force there
 
 
+def test_jumps_at_every_sample(fmu: Path) -> None:
+    """Inputs that change every 20 ms, against the oracle stopped at each change."""
+    times = np.arange(0.02, 0.6, 0.02)
+    pushes = [np.outer(np.arange(1, 6), [1.0, -2.0]) * np.cos(7.0 * time) for time in times]
+    expected = simulate(
+        read_game(default_game()),
+        [0.6],
+        rtol=1e-9,
+        breakpoints=[(time, {"d_ext": push}) for time, push in zip(times, pushes, strict=True)],
+    )
+
+    def by_hand(time: float) -> np.ndarray:
+        row = np.searchsorted(times, time + 1e-9) - 1
+        return pushes[row] if row >= 0 else np.zeros((5, 2))
+
+    with Simulator(fmu) as simulator:
+        result = simulator.run(stop_time=0.6, inputs=by_hand)
+        without = simulator.run(stop_time=0.6)
+    assert np.abs(result.x[-1] - expected.x[-1]).max() < 1e-4
+    assert np.abs(without.x[-1] - expected.x[-1]).max() > 1e-2
+
+
 def test_straight_between_rows(fmu: Path, tmp_path: Path, model: Model) -> None:
     """The FMU gets the slope, not a staircase: the oracle's rates under a ramp from 1.005 to 1.015 s."""
     ramp = read_disturbance(pulse(tmp_path / "ramp.csv"), model, linear=True)

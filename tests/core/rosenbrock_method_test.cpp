@@ -1,0 +1,115 @@
+#include "rosenbrock_method.hpp"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Dense>
+#include <cmath>
+#include <utility>
+
+namespace mixed_order_game {
+namespace {
+
+using Vector3 = Eigen::Vector3d;
+using Matrix3 = Eigen::Matrix3d;
+
+/// Prothero and Robinson's problem beside a nonlinear oscillator that it drives: y_1' = -stiffness (y_1 - sin t) + cos
+/// t with y_1 = sin t, and y_2' = y_3, y_3' = -sin y_2 + y_1.
+class DrivenPendulum final : public RosenbrockSystem {
+ public:
+  explicit DrivenPendulum(Real stiffness, bool exact = true) : stiffness_(stiffness), exact_(exact) {}
+
+  int rate(Real t, const Real* y, Real* rate) noexcept override {
+    rate[0] = -stiffness_ * (y[0] - std::sin(t)) + std::cos(t);
+    rate[1] = y[2];
+    rate[2] = -std::sin(y[1]) + y[0];
+    return 0;
+  }
+  int newton_matrix(const Real* y, Real gamma) noexcept override {
+    Matrix3 J = Matrix3::Zero();
+    J(0, 0) = -stiffness_;
+    J(1, 2) = 1.0;
+    if (exact_) {
+      J(2, 1) = -std::cos(y[1]);
+      J(2, 0) = 1.0;
+    }
+    factors_ = (Matrix3::Identity() - gamma * J).partialPivLu();
+    return 0;
+  }
+  int solve(Real* b) noexcept override {
+    Eigen::Map<Vector3> rhs(b);
+    rhs = factors_.solve(rhs).eval();
+    return 0;
+  }
+
+ private:
+  Real stiffness_;
+  bool exact_;
+  Eigen::PartialPivLU<Matrix3> factors_;
+};
+
+/// The state at 1 s from (0, 1, 0), by equal steps, and the largest estimate of an error.
+std::pair<Vector3, Real> run(DrivenPendulum system, int steps) {
+  RosenbrockMethod method(system, 3);
+  const Vector3 weight = Vector3::Ones();
+  Vector3 state(0.0, 1.0, 0.0);
+  Vector3 next;
+  Real largest = 0.0;
+  for (int k = 0; k < steps; ++k) {
+    const Real h = 1.0 / steps;
+    Real error = 0.0;
+    EXPECT_EQ(method.step(k * h, h, 0.0, state.data(), weight.data(), next.data(), error), 0);
+    largest = std::max(largest, error);
+    state = next;
+  }
+  return {state, largest};
+}
+
+TEST(RosenbrockMethod, IsOfOrderFiveWithAnEstimateOfOrderFour) {
+  const Vector3 exact = run(DrivenPendulum(1.0), 256).first;
+  EXPECT_NEAR(exact[0], std::sin(1.0), 1e-12);
+  const auto [coarse, coarse_estimate] = run(DrivenPendulum(1.0), 4);
+  const auto [fine, fine_estimate] = run(DrivenPendulum(1.0), 8);
+  EXPECT_GT(std::log2((coarse - exact).norm() / (fine - exact).norm()), 4.7);
+  EXPECT_GT(std::log2(coarse_estimate / fine_estimate), 4.7);  // of one step: one order more
+  EXPECT_LT((fine - exact).norm(), 8 * fine_estimate);
+}
+
+TEST(RosenbrockMethod, StepsOverWhatIsStiff) {
+  const Vector3 exact = run(DrivenPendulum(1e6), 256).first;
+  const Vector3 coarse = run(DrivenPendulum(1e6), 8).first;
+  EXPECT_NEAR(coarse[0], std::sin(1.0), 1e-8);
+  EXPECT_LT((coarse - exact).norm(), 1e-6);
+}
+
+TEST(RosenbrockMethod, SeesInItsEstimateWhatTheJacobianLacks) {
+  const Vector3 exact = run(DrivenPendulum(1.0), 256).first;
+  const auto [coarse, coarse_estimate] = run(DrivenPendulum(1.0, false), 8);
+  const auto [fine, fine_estimate] = run(DrivenPendulum(1.0, false), 16);
+  EXPECT_GT((coarse - exact).norm() / (fine - exact).norm(), 4.0);
+  EXPECT_GT(coarse_estimate, 10 * run(DrivenPendulum(1.0), 8).second);
+  EXPECT_LT((coarse - exact).norm(), 8 * coarse_estimate);
+}
+
+TEST(RosenbrockMethod, AsksForASmallerStepWhereARateIsNotFinite) {
+  class Pole final : public RosenbrockSystem {
+   public:
+    int rate(Real t, const Real* /*y*/, Real* rate) noexcept override {
+      rate[0] = t < 0.5 ? 0.0 : std::nan("");
+      return 0;
+    }
+    int newton_matrix(const Real* /*y*/, Real /*gamma*/) noexcept override { return 0; }
+    int solve(Real* /*b*/) noexcept override { return 0; }
+  } pole;
+  RosenbrockMethod method(pole, 1);
+  const Real state = 1.0;
+  const Real weight = 1.0;
+  Real next = 0.0;
+  Real error = 0.0;
+  EXPECT_EQ(method.step(0.0, 1.0, 0.0, &state, &weight, &next, error), 0);
+  EXPECT_FALSE(std::isfinite(error));
+  EXPECT_EQ(method.step(0.0, 0.25, 0.0, &state, &weight, &next, error), 0);
+  EXPECT_EQ(error, 0.0);
+}
+
+}  // namespace
+}  // namespace mixed_order_game
