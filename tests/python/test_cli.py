@@ -247,6 +247,14 @@ def test_demo(fmu: Path, tmp_path: Path) -> None:
     sentence(mog("demo", "--fmu", fmu, "--output", tmp_path / "file"))
 
 
+def test_demo_needs_no_extra(fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("mixed_order_game.studies.demo.has", lambda _: False)
+    assert mog("demo", "--fmu", fmu, "--output", tmp_path / "demo").exit_code == 0
+    names = {path.name for path in (tmp_path / "demo").iterdir()}
+    assert {"robust.csv", "unperturbed.csv"} <= names
+    assert not any(name.endswith(".parquet") for name in names)
+
+
 @pytest.mark.parametrize(
     ("console", "title", "byte"),
     [
