@@ -7,6 +7,7 @@ from typing import Any
 from .errors import MissingPackageError
 
 EXTRAS = {
+    "bokeh": "app",
     "distributed": "dask",
     "jinja2": "report",
     "jsonschema": "check",
@@ -14,6 +15,7 @@ EXTRAS = {
     "plotly": "report",
     "pyarrow": "parquet",
     "sympy": "symbols",
+    "tornado": "app",
     "xarray": "tables",
 }
 

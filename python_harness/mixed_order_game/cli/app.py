@@ -19,6 +19,7 @@ from .build import build
 from .check import check
 from .compare import compare
 from .demo import demo
+from .explore import explore
 from .info import info
 from .new import new
 from .panels import grouped
@@ -81,7 +82,7 @@ def root(
 
 
 COMMANDS = {
-    "Run and show": (demo, run, plot, report),
+    "Run and show": (demo, run, explore, plot, report),
     "Judge": (validate, analyse, compare),
     "Many runs": (sweep, tune),
     "Games": (new, check, schema, info),

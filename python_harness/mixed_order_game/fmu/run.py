@@ -357,15 +357,18 @@ class Simulator:
         *,
         values: Mapping[str, Value],
         tolerance: float,
+        inputs: Inputs | None = None,
     ) -> tuple[str, ...]:
         """Run through times (T,), in s, of any spacing, and let a recorder read at each.
 
-        Returns what the FMU logged. Raises VariableError for a value that the FMU would not take,
-        SimulationError for whatever it refuses.
+        inputs: external disturbance d_ext, as in run. Returns what the FMU logged. Raises VariableError for a
+        value that the FMU would not take, SimulationError for whatever it refuses. What the recorder raises
+        ends the run.
         """
         start = self.model.expanded(values)
         checked = {name: check_value(self.model.variable(name), value) for name, value in start.items()}
-        return self._walk(time, recorder, values=checked, tolerance=tolerance)
+        disturbance = _disturbance(self.model, inputs, time)
+        return self._walk(time, recorder, values=checked, tolerance=tolerance, disturbance=disturbance)
 
     def _walk(
         self,
