@@ -1,7 +1,9 @@
 // The communication graph on a circle: an edge, or two players one after the other, toggles.
 
 const SVG = "http://www.w3.org/2000/svg";
-const RADIUS = 92, ALL_PAIRS = 8;
+const RADIUS = 92;
+const ALL_PAIRS = 8;  // players up to which edges that are absent are shown, too
+const MOST_STOPS = 60;  // edges up to which the keyboard stops at each; players always
 
 function drawn(tag, attributes, ...children) {
   const made = document.createElementNS(SVG, tag);
@@ -74,17 +76,18 @@ export class Graph {
 
   show() {
     const every = this.facts.players.length <= ALL_PAIRS;
+    const weights = Object.keys(this.facts.edges).map(name => [name, this.shown.value(name)]).filter(([, weight]) => weight > 0 || every);
+    const told = JSON.stringify(weights);
+    if (told === this.told) return;
+    this.told = told;
     const focused = document.activeElement?.dataset?.edge;
-    const made = [];
-    for (const name of Object.keys(this.facts.edges)) {
-      const weight = this.shown.value(name);
-      if (weight > 0 || every) made.push(this.edge(name, weight));
-    }
+    this.svg.style.setProperty("--width", Math.min(2, 150 / weights.length));
+    const made = weights.map(([name, weight]) => this.edge(name, weight, weights.length <= MOST_STOPS));
     this.edges.replaceChildren(...made);
     if (focused) made.find(each => each.dataset.edge === focused)?.focus();
   }
 
-  edge(name, weight) {
+  edge(name, weight, stop) {
     const [i, j] = name.match(/\d+/g).map(Number);  // i hears j
     const [[x1, y1], [x2, y2]] = [this.place[j - 1], this.place[i - 1]];
     const bend = this.facts.directed ? 0.12 : 0;
@@ -92,7 +95,7 @@ export class Graph {
     const d = `M${x1} ${y1}Q${cx} ${cy} ${x2} ${y2}`;
     const told = this.facts.directed ? `${i} hears ${j}` : `edge ${i}-${j}`;
     const group = drawn("g", {
-      class: "edge", tabindex: 0, role: "switch", "aria-checked": String(weight > 0), "data-edge": name,
+      class: "edge", tabindex: stop ? 0 : -1, role: "switch", "aria-checked": String(weight > 0), "data-edge": name,
       "aria-label": weight > 0 && weight !== 1 ? `${told}, weight ${weight}` : told,
     }, Object.assign(drawn("title", {}), { textContent: `${name} = ${weight}` }),
     drawn("path", { class: "hit", d }), drawn("path", { class: "drawn", d }));

@@ -4,6 +4,7 @@ import { extent, hold } from "./ranges.js";
 
 const DASHES = [[], [6, 3], [2, 3], [8, 3, 2, 3]];
 const ESCAPED = 30;  // a run that leaves is shown up to so many times what else is there
+const BEHIND = { line_alpha: 0.4, line_width: 1.2, visible: false };  // of a pinned run; what is not drawn costs nothing
 const TICKS = [-10000, -1000, -100, -10, -1, 0, 1, 10, 100, 1000, 10000];
 
 // Colours that differ, on light and dark paper: the palette of Okabe and Ito without black, more by their hue.
@@ -17,7 +18,7 @@ const ink = name => getComputedStyle(document.documentElement).getPropertyValue(
 
 export class Pictures {
   constructor(facts, shown, colours) {
-    Object.assign(this, { facts, shown, colours, axes: [1, Math.min(2, facts.dimension)], pinned: null, transient: true });
+    Object.assign(this, { facts, shown, colours, behind: [], axes: [1, Math.min(2, facts.dimension)], pinned: null, transient: true });
     [this.N, this.D] = [facts.players.length, facts.dimension];
     this.flat = this.D === 1;
     this.views = {};
@@ -53,7 +54,7 @@ export class Pictures {
 
   curves(plot, source, options = {}) {
     return plot.multi_line({ field: "xs" }, { field: "ys" }, {
-      source, line_color: { field: "colour" }, line_dash: { field: "dash" }, line_width: 1.8, ...options,
+      source, line_color: { field: "colour" }, line_dash: { field: "dash" }, line_width: this.N > 20 ? 0.8 : 1.8, ...options,
     });
   }
 
@@ -63,7 +64,7 @@ export class Pictures {
       plot, pinned: this.source({ xs: [], ys: [], colour: [], dash: [] }), paths: this.source({ xs: [], ys: [], colour: [], dash: [] }),
       edges: this.source({ xs: [], ys: [] }), rest: this.source({ x: [], y: [] }), players: this.source({ x: [], y: [], colour: [] }),
     };
-    this.curves(plot, this.plane.pinned, { line_alpha: 0.4, line_width: 1.2 });
+    this.behind.push(this.curves(plot, this.plane.pinned, BEHIND));
     this.plane.graph = plot.multi_line({ field: "xs" }, { field: "ys" }, { source: this.plane.edges, line_alpha: 0.5, line_width: 1 });
     this.curves(plot, this.plane.paths);
     this.plane.stars = plot.scatter({ field: "x" }, { field: "y" }, { source: this.plane.rest, marker: "x", size: 11, line_width: 2 });
@@ -79,7 +80,7 @@ export class Pictures {
       plot, pinned: this.source({ xs: [], ys: [], colour: [], dash: [] }), paths: this.source({ xs: [], ys: [], colour: [], dash: [] }),
       rest: this.source({ x: [], y: [], colour: [] }), cursor: new Bokeh.Span({ location: 0, dimension: "height", line_width: 1 }),
     };
-    this.curves(plot, this.lines.pinned, { line_alpha: 0.4, line_width: 1.2 });
+    this.behind.push(this.curves(plot, this.lines.pinned, BEHIND));
     this.curves(plot, this.lines.paths);
     plot.scatter({ field: "x" }, { field: "y" }, { source: this.lines.rest, marker: "x", size: 9, line_width: 2, line_color: { field: "colour" } });
     plot.add_layout(this.lines.cursor);
@@ -92,7 +93,7 @@ export class Pictures {
       plot, pinned: this.source({ x: [], y: [] }), path: this.source({ x: [], y: [] }),
       cursor: new Bokeh.Span({ location: 0, dimension: "height", line_width: 1 }),
     };
-    this.error.behind = plot.line({ field: "x" }, { field: "y" }, { source: this.error.pinned, line_width: 1.5, line_dash: [5, 3] });
+    this.error.behind = plot.line({ field: "x" }, { field: "y" }, { source: this.error.pinned, line_width: 1.5, line_dash: [5, 3], visible: false });
     this.error.line = plot.line({ field: "x" }, { field: "y" }, { source: this.error.path, line_width: 1.8 });
     plot.add_layout(this.error.cursor);
     await this.show("error");
@@ -107,7 +108,7 @@ export class Pictures {
     this.modes = { plot, pinned: this.source({ x: [], y: [] }), now: this.source({ x: [], y: [] }) };
     const unstable = new Bokeh.BoxAnnotation({ left: 0, fill_color: "#d03020", fill_alpha: 0.12, line_color: "#d03020", line_alpha: 0.6 });
     plot.add_layout(unstable);
-    this.modes.behind = plot.scatter({ field: "x" }, { field: "y" }, { source: this.modes.pinned, size: 9, fill_alpha: 0 });
+    this.modes.behind = plot.scatter({ field: "x" }, { field: "y" }, { source: this.modes.pinned, size: 9, fill_alpha: 0, visible: false });
     this.modes.points = plot.scatter({ field: "x" }, { field: "y" }, { source: this.modes.now, marker: "x", size: 9, line_width: 1.8 });
     await this.show("spectrum");
   }
@@ -177,7 +178,7 @@ export class Pictures {
     this.lines.paths.data = this.inTime(picture);
     const every = Array.from({ length: this.D }, (_, l) => rest(l + 1)).flat();
     this.lines.rest.data = {
-      x: every.map(() => this.transient ? this.settled : this.shown.stop), y: every, colour: Array.from({ length: this.D }, () => this.colours).flat(),
+      x: every.map(() => 0.995 * (this.transient ? this.settled : this.shown.stop)), y: every, colour: Array.from({ length: this.D }, () => this.colours).flat(),
     };
     this.error.path.data = { x: picture.time, y: picture.error };
     if (!dragging) this.fit();
@@ -186,6 +187,7 @@ export class Pictures {
 
   pin(picture, modes) {
     this.pinned = picture;
+    for (const renderer of [...this.behind, this.error.behind, this.modes.behind]) renderer.visible = picture !== null;
     const none = { xs: [], ys: [], colour: [], dash: [] };
     if (!this.flat) this.plane.pinned.data = picture ? this.inPlane(picture) : none;
     this.lines.pinned.data = picture ? this.inTime(picture) : none;
@@ -217,7 +219,7 @@ export class Pictures {
 
   // A round time some while after the run has settled.
   get settled() {
-    const time = 3 * (this.picture.figures?.settling_time || this.shown.stop);
+    const time = 2 * (this.picture.figures?.settling_time || this.shown.stop);
     const power = 10 ** Math.floor(Math.log10(time));
     return Math.min(this.shown.stop, [1, 2, 5, 10].find(each => each * power >= time) * power);
   }
