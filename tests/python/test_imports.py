@@ -93,6 +93,8 @@ def test_a_missing_package_is_told_with_its_extra(
     command = {
         "pyarrow": ["run", fmu, "--stop-time", "0.1", "--output", parquet],
         "jsonschema": ["check", bad],
+        "bokeh": ["explore", fmu, "--no-browser"],
+        "tornado": ["explore", fmu, "--no-browser"],
         "jinja2": ["report", fmu, "--output", tmp_path / "a.html"],
         "plotly": ["report", fmu, "--output", tmp_path / "a.html"],
         "distributed": [

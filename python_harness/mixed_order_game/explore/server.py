@@ -2,6 +2,8 @@
 
 import asyncio
 import json
+import os
+import socket
 import threading
 from collections.abc import Awaitable, Callable
 from pathlib import Path
@@ -9,10 +11,9 @@ from typing import Any
 
 from bokeh.settings import settings as bokeh_settings
 from tornado.httpserver import HTTPServer
-from tornado.netutil import bind_sockets
 from tornado.web import Application, HTTPError, RequestHandler, StaticFileHandler
 
-from ..errors import MixedOrderGameError, reason
+from ..errors import MixedOrderGameError
 from ..fmu.run import Simulator
 from .picture import refused
 from .wish import Wish, wish_of
@@ -51,20 +52,23 @@ def serve(game: Path | str | None, *, port: int | None, ready: Callable[[str], o
 
 
 async def _serve(worker: Worker, port: int | None, ready: Callable[[str], object]) -> None:
-    sockets = _listening(port)
+    listening = _listening(port)
     server = HTTPServer(_application(worker), max_body_size=LONGEST_REQUEST)
-    server.add_sockets(sockets)
-    ready(f"http://{ADDRESS}:{sockets[0].getsockname()[1]}/")
+    server.add_socket(listening)
+    ready(f"http://{ADDRESS}:{listening.getsockname()[1]}/")
     await asyncio.Event().wait()
 
 
-def _listening(port: int | None) -> list[Any]:
+def _listening(port: int | None) -> socket.socket:
     try:
-        return list(bind_sockets(PORT if port is None else port, ADDRESS))
+        listening = socket.create_server((ADDRESS, PORT if port is None else port))
     except OSError as error:
         if port is None:
             return _listening(0)
-        raise MixedOrderGameError(f"there can be no page at port {port}: {reason(error)}") from error
+        why = os.strerror(error.errno or 0).lower()  # without the address, which Python's own text repeats
+        raise MixedOrderGameError(f"there can be no page at port {port}: {why}") from error
+    listening.setblocking(False)  # noqa: FBT003 - the name says it
+    return listening
 
 
 def _application(worker: Worker) -> Application:

@@ -29,7 +29,7 @@ const problem = text => {
 };
 const failed = error => problem(error instanceof TypeError ? "The server of this page does not answer: has mog explore ended?" : error.message);
 
-const run = latest("run", response => pictureOf(response, facts), picture => {
+const run = latest("run", response => pictureOf(response, facts), (picture, wish) => {
   problem(picture.problem);
   if (picture.time.length) {
     current = picture;
@@ -37,9 +37,11 @@ const run = latest("run", response => pictureOf(response, facts), picture => {
     handles.place();
     figures();
   }
+  spectrum(wish);  // after the run, so that the two do not wait for each other
   const begun = asked;
   requestAnimationFrame(() => setTimeout(() => {  // after it was painted
     if (begun !== asked) return;
+    $("pictures").setAttribute("aria-busy", "false");
     const { duration } = performance.measure("change to picture", { start: begun });
     $("pace").textContent = `Answered in ${Math.round(duration)} ms.`;
     document.body.dataset.drawn = shown.text;
@@ -59,6 +61,14 @@ const graph = new Graph(facts, shown, colours, () => changed());
 const handles = new Handles(facts, shown, pictures, colours, changed);
 const playback = new Playback(shown, time => pictures.moment(time));
 
+let settling = 0;
+
+// The address follows when changes pause: browsers bear few new ones a second.
+function keepAddress() {
+  clearTimeout(settling);
+  settling = setTimeout(() => history.replaceState(null, "", shown.address), 200);
+}
+
 // Called after every change: shows it everywhere and asks for its run.
 function changed() {
   asked = performance.now();
@@ -73,9 +83,9 @@ function changed() {
     ? shown.pushes.map(([time, i, l, size, duration]) => `d_ext[${i},${l}] = ${size} from ${time} s for ${duration} s`).join("; ")
     : "d_ext at the time shown, while it plays or not";
   $("claims").classList.add("earlier");
-  history.replaceState(null, "", shown.address || "#");
+  keepAddress();
+  $("pictures").setAttribute("aria-busy", "true");
   run(shown.wish);
-  spectrum(shown.wish);
 }
 
 function figures() {
@@ -99,7 +109,7 @@ function pin(picture, found, text) {
   pictures.pin(picture, found);
   $("pin").textContent = picture ? "Take the pin off" : "Pin this run";
   $("pin").setAttribute("aria-pressed", String(picture !== null));
-  history.replaceState(null, "", shown.address || "#");
+  keepAddress();
   figures();
 }
 
@@ -187,7 +197,7 @@ function choose(name) {
 }
 choose(pictures.flat ? "lines" : "plane");
 $("plane").hidden = pictures.flat;
-$("lines-hint").textContent = pictures.flat ? "drag a start, or move it with the arrow keys" : "solid, dashed, dotted: coordinates 1, 2, 3";
+$("lines-hint").textContent = pictures.flat ? "drag a start, or move it with the arrow keys" : ["solid", "dashed", "dotted", "dash-dotted"].slice(0, facts.dimension).map((dash, l) => `${l + 1} ${dash}`).join(", ");
 const pairs = [[1, 2], [1, 3], [2, 3]].filter(([, b]) => b <= facts.dimension);
 $("axes").append(...pairs.map(pair => element("option", { value: pair, textContent: pair.join(" and ") })));
 $("axes-label").hidden = pairs.length < 2;
@@ -205,6 +215,7 @@ addEventListener("hashchange", () => {
   shown.read(location.hash);
   changed();
 });
+window.explored = { shown, pictures };  // for the console of the browser
 const named = shown.pinned;
 handles.show(player());
 playback.at(shown.stop);

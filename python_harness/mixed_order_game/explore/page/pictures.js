@@ -34,7 +34,7 @@ export class Pictures {
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.paint());
   }
 
-  async figure(name, options) {
+  figure(name, options) {
     const plot = Bokeh.Plotting.figure({
       tools: "", toolbar_location: null, sizing_mode: "stretch_both", min_border: 4, output_backend: "canvas",
       background_fill_color: null, border_fill_color: null, outline_line_color: null, ...options,
@@ -46,6 +46,10 @@ export class Pictures {
   async show(name) {
     const made = this.views[name];
     made.view = await Bokeh.Plotting.show(made.plot, document.querySelector(`#${name} .plot`));
+    const host = made.view.el;
+    host.setAttribute("role", "img");
+    host.setAttribute("aria-label", document.querySelector(`#${name} figcaption`).firstChild.textContent.trim());
+    host.shadowRoot.querySelector(".bk-Canvas").tabIndex = -1;  // there is nothing to be done by keys in it
   }
 
   source(data) {
@@ -59,7 +63,7 @@ export class Pictures {
   }
 
   async buildPlane() {
-    const plot = await this.figure("plane", { x_range: [0, 1], y_range: [0, 1] });
+    const plot = this.figure("plane", { x_range: [0, 1], y_range: [0, 1] });
     this.plane = {
       plot, pinned: this.source({ xs: [], ys: [], colour: [], dash: [] }), paths: this.source({ xs: [], ys: [], colour: [], dash: [] }),
       edges: this.source({ xs: [], ys: [] }), rest: this.source({ x: [], y: [] }), players: this.source({ x: [], y: [], colour: [] }),
@@ -75,7 +79,7 @@ export class Pictures {
   }
 
   async buildLines() {
-    const plot = await this.figure("lines", { x_range: [0, this.shown.stop], y_range: [0, 1], x_axis_label: "time (s)" });
+    const plot = this.figure("lines", { x_range: [0, this.shown.stop], y_range: [0, 1], x_axis_label: "time (s)" });
     this.lines = {
       plot, pinned: this.source({ xs: [], ys: [], colour: [], dash: [] }), paths: this.source({ xs: [], ys: [], colour: [], dash: [] }),
       rest: this.source({ x: [], y: [], colour: [] }), cursor: new Bokeh.Span({ location: 0, dimension: "height", line_width: 1 }),
@@ -88,7 +92,7 @@ export class Pictures {
   }
 
   async buildError() {
-    const plot = await this.figure("error", { x_range: [0, this.shown.stop], y_range: [1e-6, 1], y_axis_type: "log", x_axis_label: "time (s)" });
+    const plot = this.figure("error", { x_range: [0, this.shown.stop], y_range: [1e-6, 1], y_axis_type: "log", x_axis_label: "time (s)" });
     this.error = {
       plot, pinned: this.source({ x: [], y: [] }), path: this.source({ x: [], y: [] }),
       cursor: new Bokeh.Span({ location: 0, dimension: "height", line_width: 1 }),
@@ -100,7 +104,7 @@ export class Pictures {
   }
 
   async buildSpectrum() {
-    const plot = await this.figure("spectrum", { x_range: [-6, 2], y_range: [-3, 3] });
+    const plot = this.figure("spectrum", { x_range: [-6, 2], y_range: [-3, 3] });
     for (const axis of [...plot.below, ...plot.left]) {  // places are asinh(value), so that slow modes are seen beside fast ones
       axis.ticker = new Bokeh.FixedTicker({ ticks: TICKS.map(Math.asinh) });
       axis.major_label_overrides = new Map(TICKS.map(tick => [Math.asinh(tick), `${tick}`.replace("-", "−")]));
