@@ -63,8 +63,8 @@ def test_commands_that_print_values_print_json() -> None:
     printing = {
         name for name, command in COMMANDS.items() if any(p.name == "as_json" for p in command.params)
     }
-    # the others print names of files, or JSON alone
-    assert set(COMMANDS) - printing == {"build", "new", "plot", "schema", "ssp"}
+    # the others print names of files, an address, or JSON alone
+    assert set(COMMANDS) - printing == {"build", "explore", "new", "plot", "schema", "ssp"}
 
 
 def test_verbose_tells_what_is_done_and_quiet_nothing() -> None:

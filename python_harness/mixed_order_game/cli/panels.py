@@ -28,6 +28,7 @@ PANELS = {
         "arm_linux", "as_json", "figure", "file_format", "force", "heat_maps", "kinds", "output",
         "schema", "tables", "until", "variables", "width",
     ),
+    "The page": ("browser", "port"),
 }  # fmt: skip
 """Options by their parameters' names; others, --help among them, stand under Options."""
 
