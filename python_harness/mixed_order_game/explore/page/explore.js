@@ -21,7 +21,7 @@ const colours = coloursOf(facts.players.length);
 const pictures = new Pictures(facts, shown, colours);
 await pictures.build();
 
-let asked = 0, current = null, modes = null, pinned = null;
+let asked = 0, wished = null, current = null, modes = null, pinned = null;
 
 const problem = text => {
   $("problem").textContent = text ?? "";
@@ -38,11 +38,10 @@ const run = latest("run", response => pictureOf(response, facts), (picture, wish
     figures();
   }
   spectrum(wish);  // after the run, so that the two do not wait for each other
-  const begun = asked;
   requestAnimationFrame(() => setTimeout(() => {  // after it was painted
-    if (begun !== asked) return;
+    if (wish !== wished) return;
     $("pictures").setAttribute("aria-busy", "false");
-    const { duration } = performance.measure("change to picture", { start: begun });
+    const { duration } = performance.measure("change to picture", { start: asked });
     $("pace").textContent = `Answered in ${Math.round(duration)} ms.`;
     document.body.dataset.drawn = shown.text;
   }));
@@ -85,7 +84,8 @@ function changed() {
   $("claims").classList.add("earlier");
   keepAddress();
   $("pictures").setAttribute("aria-busy", "true");
-  run(shown.wish);
+  wished = shown.wish;
+  run(wished);
 }
 
 function figures() {
