@@ -11,6 +11,7 @@ EXTRAS = {
     "distributed": "dask",
     "jinja2": "report",
     "jsonschema": "check",
+    "latex2mathml": "report",
     "pandas": "tables",
     "plotly": "report",
     "pyarrow": "parquet",

@@ -80,7 +80,8 @@ def test_a_missing_package_is_told_with_its_extra(
     for name in [name for name in sys.modules if name.split(".")[0] == package]:
         monkeypatch.setitem(sys.modules, name, None)
     monkeypatch.setitem(sys.modules, package, None)
-    monkeypatch.setitem(sys.modules, f"{package}.offline", None)
+    for part in ("offline", "converter"):
+        monkeypatch.setitem(sys.modules, f"{package}.{part}", None)
     told = f'pip install "mixed-order-game[{EXTRAS[package]}]"'
     if package == "sympy":
         with pytest.raises(MissingPackageError, match="this needs sympy: pip install"):
@@ -96,6 +97,7 @@ def test_a_missing_package_is_told_with_its_extra(
         "bokeh": ["explore", fmu, "--no-browser"],
         "tornado": ["explore", fmu, "--no-browser"],
         "jinja2": ["report", fmu, "--output", tmp_path / "a.html"],
+        "latex2mathml": ["report", fmu, "--output", tmp_path / "a.html"],
         "plotly": ["report", fmu, "--output", tmp_path / "a.html"],
         "distributed": [
             "sweep",

@@ -8,6 +8,7 @@ import time
 import zipfile
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import partial
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
@@ -186,7 +187,7 @@ def test_the_page_is_self_contained(page: Path) -> None:
     assert all(str(value).startswith(("#", "data:")) for *_, value in links)
     policy = next(each for tag, each in read.elements if tag == "meta" and "http-equiv" in each)["content"]
     assert str(policy).startswith("default-src 'none'")
-    assert page.stat().st_size < 12e6
+    assert page.stat().st_size < 3e6
 
 
 def test_the_page_tells_claims_parameters_and_provenance(page: Path, evidence: Evidence) -> None:
@@ -203,6 +204,10 @@ def test_the_page_tells_claims_parameters_and_provenance(page: Path, evidence: E
     ):
         assert part in text
     assert "differs from the FMU" not in text
+    assert evidence.analysis is not None
+    for verdict in evidence.analysis.verdicts:
+        assert verdict in text
+    assert page.read_text(encoding="utf-8").count("<math") > 20
 
 
 def test_equal_evidence_gives_equal_pages(evidence: Evidence, page: Path) -> None:
@@ -216,6 +221,16 @@ def test_changed_parameters_are_listed_and_the_claims_left_out(fmu: Path) -> Non
     assert "this run has changed parameters" in text
     words = " ".join(text.split())
     assert "parameter here start value k3 40 50 a[1,3] 0.5 0 robust false true" in words
+
+
+def test_pages_of_long_runs_stay_small(evidence: Evidence) -> None:
+    """Noise hardly compresses: samples are left out."""
+    count = 20_000
+    rng = np.random.default_rng(3)
+    columns = {name: rng.normal(size=count) ** 2 for name in evidence.result.columns}
+    longer = replace(evidence.result, time=np.linspace(0.0, 20.0, count), columns=columns)
+    page = render_page(replace(evidence, result=longer, unknown=None))
+    assert len(page) < 3e6
 
 
 def test_a_claim_that_fails_is_told(evidence: Evidence) -> None:
@@ -400,11 +415,36 @@ def test_in_chromium_names_are_not_run(fmu: Path, tmp_path: Path, open_page: Cal
 
 @needs_chromium
 def test_in_chromium_on_a_telephone(page: Path, open_page: Callable[[Path], Any]) -> None:
+    """390 px wide: nothing but tables and formulas in boxes of their own is wider than the screen."""
     browser = open_page(page)
-    browser.set_window_size(420, 800)
+    size = {"width": 390, "height": 800, "deviceScaleFactor": 1, "mobile": True}
+    browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
     width = "return [document.documentElement.scrollWidth, document.documentElement.clientWidth]"
-    wait_for(lambda: len({*browser.execute_script(width)}) == 1)
-    browser.set_window_size(1200, 1000)
+    wait_for(lambda: browser.execute_script(width) == [390, 390])
+    browser.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
+
+
+def seen(browser: Any, script: str, expected: object) -> bool:
+    return bool(browser.execute_script(script) == expected)
+
+
+@needs_chromium
+def test_in_chromium_the_figures_follow_the_dark_mode(page: Path, open_page: Callable[[Path], Any]) -> None:
+    browser = open_page(page)
+    colours = """
+        const plot = document.getElementById("plot-error");
+        return [getComputedStyle(document.body).backgroundColor, plot._fullLayout.paper_bgcolor,
+          plot._fullLayout.font.color];"""
+    assert browser.execute_script(colours) == ["rgb(255, 255, 255)", "white", "#222222"]
+    for scheme, expected in (
+        ("dark", ["rgb(22, 22, 24)", "#161618", "#e6e6e6"]),
+        ("light", ["rgb(255, 255, 255)", "white", "#222222"]),
+    ):
+        features = {"features": [{"name": "prefers-color-scheme", "value": scheme}]}
+        browser.execute_cdp_cmd("Emulation.setEmulatedMedia", features)
+        wait_for(partial(seen, browser, colours, expected))
+    browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": []})
+    assert browser.get_log("browser") == []
 
 
 def test_command(fmu: Path, tmp_path: Path) -> None:

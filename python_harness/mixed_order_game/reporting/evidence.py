@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import ModelError, ResultError, SimulationError
+from ..errors import GameError, ModelError, ResultError, SimulationError
 from ..fmu.model import Model, Value
 from ..fmu.run import Simulator
 from ..game.definition import has_expressions
@@ -18,6 +18,8 @@ from ..results.unknown_term import UNKNOWN, recorded_for_unknown_term, unknown_t
 from ..studies.claims.tolerances import PLAIN_TOLERANCE, TOLERANCE
 from ..studies.claims.unperturbed_loop import LARGEST_LINEAR_LOOP
 from ..studies.validate import Validation, validate
+from ..theory.analysis import analyse
+from ..theory.findings import Analysis
 from ..theory.linearized import linearized_loop
 from ..theory.spectrum import linear_loop, spectral_abscissa
 from ..times import in_seconds
@@ -48,6 +50,7 @@ class Evidence:
     abscissa: float | None = None  # of the linear loop of that game, 1/s
     unknown: FloatArray | None = None  # g_i(x) + d_i(t) + d_ext along the run, (T, N, D)
     validation: Validation | None = None
+    analysis: Analysis | None = None  # without runs
     notes: tuple[str, ...] = ()
 
     @property
@@ -72,6 +75,18 @@ def _predicted_rate(
     if game.players > LARGEST_LINEAR_LOOP:
         return None, [f"No rate is predicted: the linear loop of {game.players} players is too large."]
     return spectral_abscissa(linear_loop(game)), []
+
+
+def _analysis(
+    fmu: Path | str, model: Model, changes: Mapping[str, Value]
+) -> tuple[Analysis | None, list[str]]:
+    """The analysis without runs, and why there is none."""
+    if model.players > LARGEST_LINEAR_LOOP:
+        return None, [f"There is no analysis: the loop of {model.players} players is too large."]
+    try:
+        return analyse(fmu, changes=changes, simulation=False), []
+    except (GameError, ModelError, SimulationError) as error:
+        return None, [f"There is no analysis: {error}."]
 
 
 def evidence_of_game(
@@ -104,6 +119,7 @@ def evidence_of_game(
                 tolerance=tolerance,
                 outputs=[*model.signals(estimates=estimates), *(rates or [])] if estimates or rates else None,
                 progress=None if progress is None else lambda time: progress(name, time / stop),
+                fine_start=True,
             )
 
         rates = recorded_for_unknown_term(model)
@@ -120,6 +136,8 @@ def evidence_of_game(
     if rates is None:
         unknown = has_expressions(game.expressions, *UNKNOWN)
         notes.append(f"The unknown term is not drawn: {unknown}, and the FMU exposes no time derivatives.")
+    analysis, note = _analysis(fmu, model, changes or {})
+    notes += note
     validation = None
     if changes:
         notes.append("The claims are about the game as it stands; this run has changed parameters.")
@@ -133,7 +151,28 @@ def evidence_of_game(
         abscissa=abscissa,
         unknown=None if rates is None else unknown_term(game, result),
         validation=validation,
+        analysis=analysis,
         notes=tuple(notes),
+    )
+
+
+def thinned(evidence: Evidence, samples: int) -> Evidence:
+    """The same with at most so many samples of each run, evenly chosen among them, and both ends."""
+
+    def chosen(count: int) -> NDArray[np.int_]:
+        return np.unique(np.linspace(0, count - 1, min(count, samples)).round().astype(int))
+
+    def thin(result: Result) -> Result:
+        kept = chosen(len(result.time))
+        columns = {name: column[kept] for name, column in result.columns.items()}
+        return replace(result, time=result.time[kept], columns=columns)
+
+    unknown = evidence.unknown
+    return replace(
+        evidence,
+        result=thin(evidence.result),
+        plain=None if evidence.plain is None else thin(evidence.plain),
+        unknown=None if unknown is None else unknown[chosen(len(unknown))],
     )
 
 

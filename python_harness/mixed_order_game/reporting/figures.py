@@ -27,9 +27,6 @@ from .evidence import Evidence, energy_so_far, shared_signal, sphere_switches, w
 FloatArray = NDArray[np.float64]
 Trace = dict[str, Any]
 
-MOST_SAMPLES = 2000
-"""Points of one curve; longer runs are thinned out."""
-
 MOST_PLAYERS = 40
 """Players drawn one by one."""
 
@@ -481,15 +478,12 @@ def _line(
     dash: str = "solid",
     opacity: float = 1.0,
 ) -> Trace:
-    stride = max(1, -(-len(x) // MOST_SAMPLES))
-    keep = np.arange(len(x)) % stride == 0
-    keep[-1:] = True
     return {
         "type": "scatter",
         "mode": "lines",
         "name": html.escape(name),
-        "x": _packed(x[keep]),
-        "y": _packed(y[keep]),
+        "x": _packed(x),
+        "y": _packed(y),
         "line": {"color": colour, "width": width, "dash": dash},
         "opacity": opacity,
     }

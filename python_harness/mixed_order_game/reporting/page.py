@@ -1,5 +1,7 @@
 """The page: evidence and figures in one HTML file that asks no network for anything."""
 
+import base64
+import gzip
 import json
 import platform
 from collections.abc import Callable, Mapping
@@ -14,17 +16,31 @@ from ..errors import GameError
 from ..extras import need
 from ..files.writing import PAGE, RESULT, check_output, write_file
 from ..fmu.build import SOURCE_OR_RESULT, GameSource, fmu_of
-from ..fmu.model import Value, sources
+from ..fmu.model import Model, Value, sources
+from ..game.definition import named_parameters
 from ..game.parameters import game_parameters
 from ..names import parse_name
+from ..notebook import digits
 from ..results.graph_figure import edges_of, is_directed
 from ..results.metrics import SETTLED
 from ..results.result import Result, load
+from ..theory.findings import Analysis
 from ..version import package_version
-from .evidence import Evidence, energy_so_far, evidence_of_game, evidence_of_result
-from .figures import figures
+from .evidence import Evidence, energy_so_far, evidence_of_game, evidence_of_result, thinned
+from .expression_latex import name_in_latex
+from .figures import Figure, figures
+from .formulas import LOOP, costs, disturbances, dynamics
 
 TEMPLATE = "page.html.j2"
+SAMPLES = (2000, 1000, 500, 250, 125)
+"""Most samples of a run that is drawn, tried one after the other."""
+
+LARGEST_DATA = 900_000
+"""Bytes of the packed data: the page is to stay below 3 MB, of which Plotly takes 1.9."""
+
+MOST_FORMULAS = 24
+"""Lines of costs, of dynamics and of disturbances; what exceeds them is counted."""
+
 LONGEST_LIST = 400
 """Rows of a table of parameters; what exceeds them is counted."""
 
@@ -97,7 +113,7 @@ def report(
     output = Path(output)
     inputs = [Path(source)] if isinstance(source, str | Path) else []
     check_output(output, PAGE, inputs=inputs, force=force)
-    for module in ("jinja2", "plotly.offline"):
+    for module in ("jinja2", "latex2mathml.converter", "plotly.offline"):
         need(module)  # before any run
     if isinstance(source, str | Path) and RESULT.takes(Path(source)):
         source = load(source)
@@ -125,19 +141,23 @@ def render_page(evidence: Evidence) -> str:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    drawn = list(figures(evidence))
+    drawn, data = _drawn(evidence)
     text: str = environment.get_template(TEMPLATE).render(
         title=evidence.result.title or "Stored run",
-        plotly=need("plotly.offline").get_plotlyjs(),
+        plotly=_packed(need("plotly.offline").get_plotlyjs()),
         figures=drawn,
-        figure_data=_script_json({figure.name: figure.as_json() for figure in drawn}),
+        figure_data=data,
+        formulas=[] if evidence.model is None else _formulas(evidence.model),
+        loop=[(name, _typeset(latex)) for name, latex in LOOP],
+        named_parameters=[] if evidence.model is None else _named_parameters(evidence.model),
+        analysis=evidence.analysis,
+        analysis_rows=[] if evidence.analysis is None else _analysis_rows(evidence.analysis),
         summary=_summary(evidence),
         verdict=None if evidence.validation is None else evidence.validation,
         notes=[*evidence.notes, *(() if evidence.validation is None else evidence.validation.notes)],
         settings=_settings(evidence),
         scalars=_scalars(evidence),
         players=_players(evidence),
-        costs_have_expressions=evidence.model is not None and "cost" in evidence.model.expressions,
         edges=[
             f"{i}{'>' if is_directed(evidence.result) else '-'}{j}" + (f" ({w:g})" if w != 1.0 else "")
             for i, j, w in edges_of(evidence.result)
@@ -150,10 +170,69 @@ def render_page(evidence: Evidence) -> str:
     return text
 
 
-def _script_json(value: object) -> str:
-    """JSON that may stand inside a script element."""
-    text = json.dumps(value, separators=(",", ":"), allow_nan=False)
-    return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
+def _drawn(evidence: Evidence) -> tuple[list[Figure], str]:
+    """The figures, and their data packed: of as many samples as the page has room for."""
+    for samples in SAMPLES:
+        drawn = list(figures(thinned(evidence, samples)))
+        values = {figure.name: figure.as_json() for figure in drawn}
+        data = _packed(json.dumps(values, separators=(",", ":"), allow_nan=False))
+        if len(data) <= LARGEST_DATA:
+            break
+    return drawn, data
+
+
+def _packed(text: str) -> str:
+    """Compressed, as base64: a third of the text's size; equal texts give equal bytes."""
+    return base64.b64encode(gzip.compress(text.encode(), 9, mtime=0)).decode()
+
+
+def _typeset(latex: str) -> str:
+    """MathML, which browsers show without a script or a font of ours."""
+    return str(need("latex2mathml.converter").convert(latex, display="block"))
+
+
+def _formulas(model: Model) -> list[dict[str, Any]]:
+    """Headings with their lines: of whom, and MathML."""
+    parts = {
+        "Costs": costs(model),
+        "Unknown dynamics": dynamics(model),
+        "Disturbances": disturbances(model),
+    }
+    return [
+        {
+            "title": title,
+            "lines": [(line.whose, _typeset(line.latex)) for line in lines[:MOST_FORMULAS]],
+            "more": max(0, len(lines) - MOST_FORMULAS),
+        }
+        for title, lines in parts.items()
+        if lines
+    ]
+
+
+def _named_parameters(model: Model) -> list[tuple[str, str, str, str]]:
+    """Named parameters of expressions: name, value, unit, meaning."""
+    rows = []
+    for each in named_parameters(model.game):
+        if isinstance(each.value, list) and isinstance(each.value[0], list):
+            value = "; ".join(", ".join(f"{entry:g}" for entry in row) for row in each.value)
+        else:
+            value = ", ".join(f"{entry:g}" for entry in np.atleast_1d(each.value))
+        rows.append((_typeset(name_in_latex(each.name)), value, each.unit, each.description))
+    return rows
+
+
+def _analysis_rows(analysis: Analysis) -> list[tuple[str, str, str, str, str]]:
+    """Figures of the analysis: section, name, value, unit, meaning."""
+    return [
+        (
+            row.section,
+            row.name,
+            row.value if isinstance(row.value, str) else digits(row.value),
+            "" if row.unit == "1" else row.unit,
+            row.meaning,
+        )
+        for row in analysis.rows
+    ]
 
 
 def _summary(evidence: Evidence) -> list[tuple[str, str]]:
@@ -211,30 +290,23 @@ def _scalars(evidence: Evidence) -> list[tuple[str, str, str, str]]:
 
 
 def _players(evidence: Evidence) -> list[dict[str, str]]:
-    """One row a player: order, cost, start, equilibrium, end."""
+    """One row a player: order, start, equilibrium, end."""
     model, result = evidence.model, evidence.result
     if model is None:
         return []
     game = game_parameters(model, evidence.changes)
     energy = energy_so_far(result)[-1]
-    rows = []
-    for i in range(min(game.players, LONGEST_LIST)):
-        coupling = game.cost_coupling[i]
-        rows.append(
-            {
-                "player": f"{i + 1}: {model.player_names[i]}",
-                "order": str(model.order[i]),
-                "quadratic": _number(game.cost_quadratic[i]),
-                "linear": _list(game.cost_linear[i]),
-                "coupling": ", ".join(f"{j + 1}: {coupling[j]:g}" for j in np.flatnonzero(coupling)),
-                "expression": model.game["player"][i].get("cost", {}).get("expression", ""),
-                "x0": _list(game.x0[i]),
-                "x_star": _list(result.x_star[i]),
-                "end": _list(result.x[-1, i]),
-                "energy": f"{energy[i]:.4g}",
-            }
-        )
-    return rows
+    return [
+        {
+            "player": f"{i + 1}: {model.player_names[i]}",
+            "order": str(model.order[i]),
+            "x0": _list(game.x0[i]),
+            "x_star": _list(result.x_star[i]),
+            "end": _list(result.x[-1, i]),
+            "energy": f"{energy[i]:.4g}",
+        }
+        for i in range(min(game.players, LONGEST_LIST))
+    ]
 
 
 def _others(result: Result) -> list[tuple[str, str]]:
