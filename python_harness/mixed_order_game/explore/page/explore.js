@@ -37,8 +37,8 @@ const run = latest("run", response => pictureOf(response, facts), (picture, wish
     handles.place();
     figures();
   }
-  spectrum(wish);  // after the run, so that the two do not wait for each other
-  requestAnimationFrame(() => setTimeout(() => {  // after it was painted
+  requestAnimationFrame(() => setTimeout(() => {  // after it was painted, so that the two do not wait for each other
+    spectrum(wish);
     if (wish !== wished) return;
     $("pictures").setAttribute("aria-busy", "false");
     const { duration } = performance.measure("change to picture", { start: asked });
@@ -165,8 +165,9 @@ $("reset").addEventListener("click", () => {
   changed();
 });
 $("copy").addEventListener("click", async () => {
-  await navigator.clipboard.writeText(shown.command);
-  $("copy").textContent = "Copied";
+  const copied = await navigator.clipboard.writeText(shown.command).then(() => true, () => false);
+  if (!copied) getSelection().selectAllChildren($("command"));
+  $("copy").textContent = copied ? "Copied" : "Selected: copy it with Ctrl-C";
   setTimeout(() => { $("copy").textContent = "Copy as command"; }, 1500);
 });
 for (const button of document.querySelectorAll("[data-file]")) {

@@ -3,7 +3,7 @@
 import { extent, hold } from "./ranges.js";
 
 const DASHES = [[], [6, 3], [2, 3], [8, 3, 2, 3]];
-const ESCAPED = 30;  // a run that leaves is shown up to so many times what else is there
+const LEAVING = 4;  // a run that leaves is shown up to so many times its start
 const BEHIND = { line_alpha: 0.4, line_width: 1.2, visible: false };  // of a pinned run; what is not drawn costs nothing
 const TICKS = [-10000, -1000, -100, -10, -1, 0, 1, 10, 100, 1000, 10000];
 
@@ -203,7 +203,8 @@ export class Pictures {
   fit() {
     const runs = this.pinned ? [this.picture, this.pinned] : [this.picture];
     const known = l => [...this.starts(l), ...this.players(i => this.picture.equilibrium(i, l))];
-    const limit = ls => ESCAPED * Math.max(1, ...ls.flatMap(known).filter(Number.isFinite).map(Math.abs));
+    const leaves = runs.some(({ error }) => error.at(-1) > LEAVING * error[0]);
+    const limit = ls => !leaves ? Infinity : LEAVING * Math.max(1, ...ls.flatMap(known).filter(Number.isFinite).map(Math.abs));
     const reach = (ls, bound) => extent([...ls.map(known), ...runs.flatMap(run => ls.flatMap(l => this.players(i => run.curve(i, l))))], bound);
     const all = Array.from({ length: this.D }, (_, l) => l + 1);
     this.error.plot.x_range.setv({ start: 0, end: this.shown.stop });
