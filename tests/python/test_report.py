@@ -3,8 +3,6 @@
 import base64
 import json
 import re
-import shutil
-import time
 import zipfile
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -32,6 +30,7 @@ from mixed_order_game.reporting.evidence import (
 from mixed_order_game.reporting.figures import MOST_PLAYERS, figures
 from mixed_order_game.reporting.page import render_page, report
 from mixed_order_game.results.unknown_term import unknown_term
+from tests.chromium import chromium, needs_chromium, wait_for
 
 EVERY_FIGURE = [
     "actions",
@@ -44,11 +43,6 @@ EVERY_FIGURE = [
     "weights",
     "control",
 ]
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
-DRIVER = shutil.which("chromedriver")
-needs_chromium = pytest.mark.skipif(
-    CHROMIUM is None or DRIVER is None, reason="there is no Chromium with its driver on this machine"
-)
 
 
 def mog(*arguments: object) -> Result:
@@ -299,36 +293,15 @@ def test_names_are_text_not_code(fmu: Path, tmp_path: Path) -> None:
 
 @pytest.fixture(scope="module")
 def open_page() -> Iterator[Callable[[Path], Any]]:
-    """Opens a page in Chromium and waits until it is drawn; what it asks for and complains of is logged."""
-    from selenium import webdriver
-    from selenium.webdriver.chrome.options import Options
-    from selenium.webdriver.chrome.service import Service
+    """Opens a page in Chromium and waits until it is drawn."""
+    with chromium() as browser:
 
-    options = Options()
-    options.binary_location = str(CHROMIUM)
-    for argument in ("--headless=new", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage"):
-        options.add_argument(argument)
-    options.add_argument("--window-size=1200,1000")
-    options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
-    browser = webdriver.Chrome(options=options, service=Service(str(DRIVER)))
-    browser.set_page_load_timeout(120)
+        def visit(path: Path) -> Any:
+            browser.get(path.as_uri())
+            wait_for(lambda: browser.execute_script("return document.body.dataset.ready") == "true")
+            return browser
 
-    def visit(path: Path) -> Any:
-        browser.get(path.as_uri())
-        wait_for(lambda: browser.execute_script("return document.body.dataset.ready") == "true")
-        return browser
-
-    try:
         yield visit
-    finally:
-        browser.quit()
-
-
-def wait_for(condition: Callable[[], object], seconds: float = 60.0) -> None:
-    end = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < end, "the page did not get there"
-        time.sleep(0.05)
 
 
 CURVES = """
