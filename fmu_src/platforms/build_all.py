@@ -15,6 +15,7 @@ import sys
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
+from xml.etree import ElementTree as ET
 
 from . import binary_table, exercise
 from .fingerprint import fingerprint
@@ -77,6 +78,7 @@ class Build:
         self.description = native / "fmu" / "modelDescription.xml"
         if not self.description.is_file():
             raise PlatformError(f"{self.description} is missing: run ./dev build first")
+        self.version = ET.parse(self.description).getroot().attrib["version"]  # noqa: S314 - our own
         self.headers = _fmi_headers()
         folder.mkdir(parents=True, exist_ok=True)
         self.ziglang = self._install_packages()
@@ -100,6 +102,7 @@ class Build:
             "SUNDIALS_SOURCE": self.sundials,
             "PUGIXML_SOURCE": self.pugixml,
             "FMI2_HEADERS_DIR": self.headers,
+            "MIXED_ORDER_GAME_VERSION": self.version,
         }
         if self.include is not None:
             options["TOMLPLUSPLUS_INCLUDE_DIR"] = self.include

@@ -68,9 +68,10 @@ def test_named_functions_and_types_exist(page: Path) -> None:
 
 def test_the_citation_is_of_this_version() -> None:
     citation = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    project, version = settings["project"], settings["tool"]["setuptools_scm"]["fallback_version"]
     assert f"\ntitle: {project['name']}\nabstract: >-\n  {project['description']}" in citation
-    assert f"\nversion: {project['version']}\nlicense: {project['license']}\n" in citation
+    assert f"\nversion: {version}\nlicense: {project['license']}\n" in citation
     paper = re.search(r"^  - type: article\n    title: >-\n      (.*)\n", citation, re.MULTILINE)
     readme = " ".join((ROOT / "README.md").read_text(encoding="utf-8").split())
     assert paper is not None
