@@ -12,15 +12,21 @@ import os
 import re
 import shutil
 import subprocess
+import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib.metadata import version
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mixed_order_game import read_model
+from tests.games_by_hand import BY_HAND
+from tests.oracle.general_loop import GeneralLoop
+
+from .cross_check import problems, write_cross_check
 
 ROOT = Path(__file__).resolve().parents[2]
 TOOLS = ROOT / "build" / "compliance"
@@ -35,6 +41,12 @@ EXCHANGE_BOUND = 1e-4
 """Of the same, where the importer integrates."""
 EULER_BOUND = 2e-2
 """Of the same, with a method of first order."""
+
+EXPRESSIONS = "cournot_isoelastic"
+"""A game whose costs, dynamics and disturbances are expressions."""
+
+COUPLED_STEPS = (0.01, 0.005, 0.0025)
+"""Communication steps of coupled FMUs, s."""
 
 FloatArray = NDArray[np.float64]
 Columns = Mapping[str, FloatArray]
@@ -89,6 +101,22 @@ def tools() -> list[Tool]:
         Tool("Ecos (ecospy)", pinned("ecospy"), simulation, ecos),
         Tool("FMI4j, Java", "0.38.0", simulation, fmi4j),
         Tool("fmi-sim, Rust", "0.7.0", simulation, fmi_sim),
+        Tool("fmuloader", pinned("fmuloader"), f"{simulation}, a serialized state too", fmuloader),
+        Tool(
+            "libcosim (libcosimpy)",
+            version("libcosimpy"),
+            f"simulated {EXPRESSIONS}, 2 s",
+            libcosim_expressions,
+        ),
+        Tool("Ecos (ecospy)", pinned("ecospy"), f"simulated {EXPRESSIONS}, 2 s", ecos_expressions),
+        Tool("fmuloader", pinned("fmuloader"), f"simulated {EXPRESSIONS}, 2 s", fmuloader_expressions),
+        Tool(
+            "libcosim (libcosimpy)",
+            version("libcosimpy"),
+            "coupled one FMU a player from SSP, 2 s",
+            libcosim_ssp,
+        ),
+        Tool("Ecos (ecospy)", pinned("ecospy"), "coupled one FMU a player from SSP, 2 s", ecos_ssp),
         Tool("FMPy", version("fmpy"), "model exchange with CVode, 20 s", fmpy_exchange),
         Tool("fmi-sim, Rust", "0.7.0", "model exchange with explicit Euler, 5 s", fmi_sim_exchange),
         Tool(
@@ -96,6 +124,12 @@ def tools() -> list[Tool]:
             pinned("casadi"),
             "model exchange with CVODES and the FMU's Jacobian, 8 s",
             daebuilder,
+        ),
+        Tool(
+            "FMPy",
+            version("fmpy"),
+            "judged and simulated a cross-check folder of three games",
+            cross_check_folder,
         ),
     ]
 
@@ -164,6 +198,45 @@ def libcosim(fmu: Path) -> str:
 def ecos(fmu: Path) -> str:
     """The co-simulation library Ecos, in an environment of its own."""
     return simulated([TOOLS / ".venv/bin/python", HERE / "ecos_simulate.py"], fmu)
+
+
+def fmuloader(fmu: Path) -> str:
+    """The loader fmuloader, driven step by step."""
+    return simulated([TOOLS / ".venv/bin/python", HERE / "fmuloader_simulate.py"], fmu)
+
+
+def libcosim_expressions(_: Path) -> str:
+    """A game with expressions in libcosim."""
+    return simulated_expressions([ROOT / ".venv/bin/python", HERE / "libcosim_simulate.py"])
+
+
+def ecos_expressions(_: Path) -> str:
+    """The same in Ecos."""
+    return simulated_expressions([TOOLS / ".venv/bin/python", HERE / "ecos_simulate.py"])
+
+
+def fmuloader_expressions(_: Path) -> str:
+    """The same in fmuloader."""
+    return simulated_expressions([TOOLS / ".venv/bin/python", HERE / "fmuloader_simulate.py"])
+
+
+def libcosim_ssp(_: Path) -> str:
+    """A system structure in libcosim."""
+    return coupled([ROOT / ".venv/bin/python", HERE / "libcosim_ssp.py"])
+
+
+def ecos_ssp(_: Path) -> str:
+    """The same in Ecos."""
+    return coupled([TOOLS / ".venv/bin/python", HERE / "ecos_ssp.py"])
+
+
+def cross_check_folder(_: Path) -> str:
+    """The folder as the cross-check's rules have it, judged by FMPy."""
+    folder = TOOLS / "cross_check"
+    made = write_cross_check(folder)
+    if found := problems(folder):
+        raise FindingError("; ".join(found))
+    return f"no problems found in {len(made)} folders"
 
 
 def fmi4j(fmu: Path) -> str:
@@ -237,6 +310,33 @@ def simulated(command: Sequence[object], fmu: Path) -> str:
     return compared(columns(results))
 
 
+def simulated_expressions(command: Sequence[object]) -> str:
+    """Run a driver on the game with expressions, for 2 s."""
+    fmu, results = TOOLS / f"{EXPRESSIONS}.fmu", TOOLS / f"{Path(str(command[-1])).stem}_expressions.csv"
+    run([ROOT / ".venv/bin/mog", "build", EXPRESSIONS, "--output", fmu])
+    names = [name for name in outputs(fmu) if name.partition("[")[0] in ("x", "v")]
+    run([*command, fmu, 100, STEP, EVERY, results, *names])
+    return compared(columns(results), BOUND, 2.0, EXPRESSIONS)
+
+
+def coupled(command: Sequence[object]) -> str:
+    """Run a driver on single vehicles; the difference from the whole game has to fall with the step."""
+    ssp, results, stop = TOOLS / "five_vehicles.ssp", TOOLS / f"{Path(str(command[-1])).stem}.csv", 2.0
+    run([ROOT / ".venv/bin/mog", "ssp", "five_vehicles", "--output", ssp])
+    reference = trajectory("five_vehicles")
+    expected = reference["x"][np.searchsorted(reference["t"], stop - 1e-9)]
+    names = [f"x[{i},{c}]" for i, c in np.argwhere(np.isfinite(expected)) + 1]
+    differences = []
+    for step in COUPLED_STEPS:
+        run([*command, ssp, stop, step, results, *names])
+        found = columns(results)
+        differences.append(float(np.abs([found[name][-1] for name in names] - expected.ravel()).max()))
+    if not all(fine < 0.6 * coarse for coarse, fine in pairwise(differences)):
+        raise FindingError(f"the difference from the oracle does not fall with the step: {differences}")
+    steps = ", ".join(f"{1000.0 * step:g}" for step in COUPLED_STEPS)
+    return f"within {', '.join(map(one_digit, differences))} of the oracle, steps of {steps} ms"
+
+
 def run(command: Sequence[object], folder: Path | None = None) -> str:
     """What a command prints, run in a folder. Raises FindingError if it fails."""
     words = [str(word) for word in command]
@@ -265,8 +365,7 @@ def compared(
     results: Columns, bound: float = BOUND, stop: float = STEP * STEPS, case: str = "five_vehicles"
 ) -> str:
     """The largest difference from the oracle. Raises FindingError if something is missing or differs."""
-    with np.load(REFERENCES / f"{case}.npz") as file:
-        reference = {name: file[name] for name in ("t", "x", "v", "z", "u", "nash_error")}
+    reference = trajectory(case)
     time, interval = results["time"], float(reference["t"][1])
     sample = np.rint(time / interval).astype(int)
     regular = np.allclose(time, reference["t"][sample], rtol=0.0, atol=1e-9)
@@ -288,6 +387,18 @@ def compared(
     if not largest < bound:
         raise FindingError(f"differs from the oracle by {largest:.1e}")
     return f"within {one_digit(largest)} of the oracle"
+
+
+def trajectory(case: str) -> dict[str, FloatArray]:
+    """The oracle's trajectory: a stored one; with expressions, from functions typed by hand."""
+    if case != EXPRESSIONS:
+        with np.load(REFERENCES / f"{case}.npz") as file:
+            return {name: file[name] for name in ("t", "x", "v", "z", "u", "nash_error")}
+    text = (ROOT / "modelDescription" / "games" / f"{case}.toml").read_text(encoding="utf-8")
+    loop = GeneralLoop(tomllib.loads(text), BY_HAND[case]())
+    time = np.arange(0.0, 2.0 + 0.5 * STEP * EVERY, STEP * EVERY)
+    x, p, _, _ = loop.unpack(loop.solve(time))
+    return {"t": time, "x": x, "v": p}  # p is v for players of order 2, who alone have a v[i,l]
 
 
 def one_digit(value: float) -> str:

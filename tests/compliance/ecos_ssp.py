@@ -1,0 +1,25 @@
+"""Runs a system structure of single players with Ecos.
+
+`python ecos_ssp.py SSP STOP STEP CSV ACTION...`
+Writes the actions, such as x[1,2], at the end.
+"""
+
+import sys
+from pathlib import Path
+
+from ecospy import EcosSimulation
+
+
+def main() -> None:
+    ssp, stop, step, csv, *names = sys.argv[1:]
+    with EcosSimulation(ssp_path=ssp, step_size=float(step)) as simulation:
+        simulation.init()
+        simulation.step(round(float(stop) / float(step)))
+        values = [simulation.get_real(f"player_{name[2:].partition(',')[0]}::{name}") for name in names]
+        simulation.terminate()
+    lines = [";".join(["time", *names]), ";".join(repr(value) for value in (float(stop), *values))]
+    Path(csv).write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
