@@ -10,7 +10,7 @@ from mixed_order_game import package_version
 
 project = "mixed-order-game"
 author = "the mixed-order-game authors"
-version = release = package_version()
+version = release = package_version().partition("+")[0]
 html_title = f"{project} {version}"
 
 extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx_copybutton"]
