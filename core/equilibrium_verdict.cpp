@@ -43,9 +43,10 @@ EquilibriumVerdict judge_equilibrium(const Parameters& parameters,
     const auto [smallest, scale] = own_curvature(cost, shape, i, verdict.x_star);
     const bool is_quadratic = cost_expressions[at(i)].graph == nullptr;
     const Real distance = is_quadratic ? everywhere : proved_distance(bounds, i, verdict.x_star, shape);
-    verdict.players.push_back({smallest, distance});
+    const Switch* kink = is_quadratic ? nullptr : bounds.kink_at(i, verdict.x_star);
+    verdict.players.push_back({smallest, distance, kink == nullptr ? "" : kink->text});
     is_nash = is_nash && distance == everywhere;
-    is_local = is_local && (distance > 0.0 || (bounds.is_smooth(i) && smallest > rounding * scale));
+    is_local = is_local && (distance > 0.0 || (kink == nullptr && smallest > rounding * scale));
   }
   verdict.kind = is_nash    ? EquilibriumVerdict::Kind::nash
                  : is_local ? EquilibriumVerdict::Kind::local_nash

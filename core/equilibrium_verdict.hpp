@@ -1,15 +1,12 @@
 // What is known of the point at which all gradients vanish: whether it is a Nash equilibrium, and the only one.
 #pragma once
 
+#include <string>
 #include <vector>
 
-#include "families/expression_cost.hpp"
-#include "game.hpp"
+#include "game_expressions.hpp"
 
 namespace mixed_order_game {
-
-/// As parse_game(toml); gives the costs' expressions, too, which the game's own cost holds compiled.
-Game parse_game(std::string_view toml, std::vector<ExpressionCost::Text>& cost_expressions);
 
 struct EquilibriumVerdict {
   enum class Kind {
@@ -21,6 +18,7 @@ struct EquilibriumVerdict {
     Real curvature;      ///< the smallest eigenvalue of d^2 f_i / dx_i^2 at x*
     Real convex_within;  ///< f_i is convex in x_i where no coordinate is farther from x* than this: infinite where it
                          ///< is convex everywhere, 0 where nothing is proved
+    std::string kink;    ///< the text of a condition of f_i that switches at x*; empty without one
   };
 
   Kind kind = Kind::open;

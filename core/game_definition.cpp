@@ -5,14 +5,13 @@
 #include "block_elimination.hpp"
 #include "definition/expression_reader.hpp"
 #include "equilibrium.hpp"
-#include "equilibrium_verdict.hpp"
 #include "errors.hpp"
 #include "families/expression_disturbance.hpp"
 #include "families/expression_dynamics.hpp"
 #include "families/polynomial_dynamics.hpp"
 #include "families/quadratic_cost.hpp"
 #include "families/sinusoidal_disturbance.hpp"
-#include "game.hpp"
+#include "game_expressions.hpp"
 #include "toml_reader.hpp"
 
 namespace mixed_order_game {
@@ -481,11 +480,11 @@ Cloned<Interface> family_of(Coefficients coefficients, bool has_expressions, con
 }  // namespace
 
 Game parse_game(std::string_view toml) {
-  std::vector<ExpressionCost::Text> cost_expressions;
-  return parse_game(toml, cost_expressions);
+  GameExpressions expressions;
+  return parse_game(toml, expressions);
 }
 
-Game parse_game(std::string_view toml, std::vector<ExpressionCost::Text>& costs) {
+Game parse_game(std::string_view toml, GameExpressions& texts) {
   const toml::table document = parse_toml(toml);
   const TomlEntry game(document);
   game.accept_keys({"title", "dimension", "expose", "strategy", "gains", "rbf", "graph", "parameters", "defaults",
@@ -509,7 +508,10 @@ Game parse_game(std::string_view toml, std::vector<ExpressionCost::Text>& costs)
   QuadraticCost cost(shape);
   PolynomialDynamics dynamics(shape);
   SinusoidalDisturbance disturbance(shape);
+  std::vector<ExpressionCost::Text>& costs = texts.costs;
   costs.clear();
+  texts.dynamics.assign(at(shape.own_entries()), {});
+  texts.disturbances = texts.dynamics;
   const PlayerExpressions none(shape.own_entries(), shape.hosts(), n, static_cast<int>(named.values.size()));
   PlayerExpressions dynamics_values = none;
   PlayerExpressions disturbance_values = none;
@@ -533,9 +535,9 @@ Game parse_game(std::string_view toml, std::vector<ExpressionCost::Text>& costs)
     read_coefficients(player["dynamics"], i, shape, dynamics.coefficients);
     read_coefficients(player["disturbance"], i, shape, disturbance.coefficients);
     expressions.add_coordinates(player["dynamics"]["expression"], Purpose::dynamics, i, dynamics_values,
-                                dynamics_graphs);
+                                dynamics_graphs, texts.dynamics);
     expressions.add_coordinates(player["disturbance"]["expression"], Purpose::disturbance, i, disturbance_values,
-                                disturbance_graphs);
+                                disturbance_graphs, texts.disturbances);
   }
   for (int h = 0; h < shape.hosts(); ++h) {
     const PlayerTable& player = players[at(shape.host(h))];

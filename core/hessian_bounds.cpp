@@ -53,17 +53,23 @@ HessianBounds::HessianBounds(const Parameters& parameters, const std::vector<Exp
   }
 }
 
-bool HessianBounds::is_smooth(int i) const {
-  return players_[at(i)] == nullptr || players_[at(i)]->all.enclosure->is_smooth();
+const Switch* HessianBounds::kink_at(int i, const std::vector<Real>& x) const {
+  constexpr Real rounding = 1e-9;
+  std::vector<Interval> box;
+  for (const Real action : x) {
+    const Real reach = rounding * (1.0 + std::abs(action));
+    box.push_back({action - reach, action + reach});
+  }
+  std::vector<Interval> values;
+  return rows(i, box, values).kink;
 }
 
-Enclosure::Definition HessianBounds::rows(int i, const std::vector<Interval>& box,
-                                          std::vector<Interval>& values) const {
+Enclosure::Found HessianBounds::rows(int i, const std::vector<Interval>& box, std::vector<Interval>& values) const {
   return enclose(i, Columns::all, box, values);
 }
 
-Enclosure::Definition HessianBounds::enclose(int i, Columns columns, const std::vector<Interval>& box,
-                                             std::vector<Interval>& values) const {
+Enclosure::Found HessianBounds::enclose(int i, Columns columns, const std::vector<Interval>& box,
+                                        std::vector<Interval>& values) const {
   const Shape& shape = parameters_.shape;
   const Coefficients& coefficients = parameters_.cost->coefficients;
   const std::size_t n = box.size();
@@ -77,10 +83,10 @@ Enclosure::Definition HessianBounds::enclose(int i, Columns columns, const std::
     for (int l = 0; l < shape.dimension; ++l) values[at(l) * n + at(shape.entry(j, l))] = Interval::of(-2.0 * coupling);
   }
   for (int l = 0; l < shape.dimension; ++l) values[at(l) * n + at(shape.entry(i, l))] = own * Interval::of(2.0);
-  if (players_[at(i)] == nullptr) return Enclosure::Definition::everywhere;
+  if (players_[at(i)] == nullptr) return {};
   const Derivatives& derivatives = columns == Columns::own ? players_[at(i)]->own : players_[at(i)]->all;
   std::vector<Interval> of_nodes;
-  const Enclosure::Definition definition = derivatives.enclosure->evaluate(
+  const Enclosure::Found found = derivatives.enclosure->evaluate(
       [&](const Leaf& leaf) {
         switch (leaf.kind) {
           case LeafKind::action:
@@ -92,14 +98,14 @@ Enclosure::Definition HessianBounds::enclose(int i, Columns columns, const std::
         }
       },
       of_nodes);
-  if (definition == Enclosure::Definition::nowhere) return definition;
+  if (found.definition == Enclosure::Definition::nowhere) return found;
   for (std::size_t k = 0; k < derivatives.place.size(); ++k) {
     const auto [l, column] = derivatives.place[k];
     if (l < 0) continue;
     Interval& value = values[at(l) * n + at(column)];
     value = value + of_nodes[k];
   }
-  return definition;
+  return found;
 }
 
 bool HessianBounds::is_positive_semidefinite(int i, const std::vector<Interval>& rows) const {
@@ -135,7 +141,6 @@ bool HessianBounds::is_positive_semidefinite(int i, const std::vector<Interval>&
 
 bool HessianBounds::is_convex(int i, const std::vector<Real>& x, Real distance) const {
   constexpr int most_boxes = 300;
-  if (!is_smooth(i)) return false;
   const Shape& shape = parameters_.shape;
   std::vector<Interval> whole;
   for (const Real action : x) whole.push_back(Interval::of(action));
@@ -153,15 +158,17 @@ bool HessianBounds::is_convex(int i, const std::vector<Real>& x, Real distance) 
     if (count == most_boxes) return false;
     const Box box = std::move(boxes.front());
     boxes.pop_front();
-    const Enclosure::Definition definition = enclose(i, Columns::own, box.actions, hessian);
-    if (definition == Enclosure::Definition::nowhere) continue;
-    if (definition != Enclosure::Definition::unknown && is_positive_semidefinite(i, hessian)) continue;
+    const Enclosure::Found found = enclose(i, Columns::own, box.actions, hessian);
+    if (found.definition == Enclosure::Definition::nowhere) continue;
+    const bool tells = found.definition != Enclosure::Definition::unknown && found.kink == nullptr;
+    if (tells && is_positive_semidefinite(i, hessian)) continue;
     std::vector<Interval> middle = box.actions;
     for (int l = 0; l < shape.dimension; ++l) {
       const std::size_t own = at(shape.entry(i, l));
       middle[own] = Interval::of(middle_of(box.actions[own]));
     }
-    if (enclose(i, Columns::own, middle, hessian) == Enclosure::Definition::everywhere) {
+    const Enclosure::Found there = enclose(i, Columns::own, middle, hessian);
+    if (there.definition == Enclosure::Definition::everywhere && there.kink == nullptr) {
       for (int l = 0; l < shape.dimension; ++l) {  // it curves downwards there
         if (hessian[at(l) * x.size() + at(shape.entry(i, l))].upper < 0.0) return false;
       }

@@ -17,11 +17,11 @@ class HessianBounds {
   /// The expressions are those of the parameters' cost, by player.
   HessianBounds(const Parameters& parameters, const std::vector<ExpressionCost::Text>& expressions);
 
-  /// Whether the player's cost has second derivatives that tell how its gradient changes: nothing in it switches.
-  [[nodiscard]] bool is_smooth(int i) const;
+  /// The condition of the player's cost that switches at x or within rounding of it; null if there is none.
+  [[nodiscard]] const Switch* kink_at(int i, const std::vector<Real>& x) const;
 
   /// Encloses d^2 f_i / (d x_il d x_jh) over a box of joint actions at values[l n + entry(j, h)], n = N D.
-  Enclosure::Definition rows(int i, const std::vector<Interval>& box, std::vector<Interval>& values) const;
+  Enclosure::Found rows(int i, const std::vector<Interval>& box, std::vector<Interval>& values) const;
 
   /// Whether f_i is proved convex in x_i at all x_i within a distance of x in each coordinate, the other players
   /// staying at x: wherever f_i is defined, which is a convex set. The distance may be infinite.
@@ -39,8 +39,8 @@ class HessianBounds {
     Derivatives all;
   };
   enum class Columns { own, all };
-  Enclosure::Definition enclose(int i, Columns columns, const std::vector<Interval>& box,
-                                std::vector<Interval>& values) const;
+  Enclosure::Found enclose(int i, Columns columns, const std::vector<Interval>& box,
+                           std::vector<Interval>& values) const;
   [[nodiscard]] bool is_positive_semidefinite(int i, const std::vector<Interval>& rows) const;
 
   const Parameters& parameters_;

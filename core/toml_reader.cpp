@@ -48,9 +48,9 @@ void refuse_endless_keys(std::string_view text) {
       }
     } else if (c == '.') {
       if (++dots > most_dots) {
-        throw GameError("line " + std::to_string(line) + " of the game definition has a key of more than " +
-                            std::to_string(most_dots) + " dots, expected the keys of a game",
-                        {}, line, 1);
+        const std::string told = "the game definition has a key of more than " + std::to_string(most_dots) +
+                                 " dots, expected the keys of a game";
+        throw GameError("line " + std::to_string(line) + " of " + told, told, {}, line, 1);
       }
     } else if (c == '\n' || c == '=' || c == ',' || c == '[' || c == ']' || c == '{' || c == '}') {
       dots = 0;
@@ -128,9 +128,9 @@ toml::table parse_toml(std::string_view text) {
     return toml::parse(text);
   } catch (const toml::parse_error& error) {
     const toml::source_position where = error.source().begin;
-    throw GameError("line " + in_digits(where.line) + ", column " + in_digits(where.column) +
-                        " of the game definition is not TOML: " + std::string(error.description()),
-                    {}, where.line, where.column);
+    const std::string told = "the game definition is not TOML: " + std::string(error.description());
+    throw GameError("line " + in_digits(where.line) + ", column " + in_digits(where.column) + " of " + told, told, {},
+                    where.line, where.column);
   }
 }
 

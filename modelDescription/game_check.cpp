@@ -3,6 +3,7 @@
 #include <map>
 #include <utility>
 
+#include "json_text.hpp"
 #include "toml_reader.hpp"
 
 namespace mixed_order_game {
@@ -50,21 +51,6 @@ Position place_of(const GameError& error, const Places& places) {
   return {1, 1};
 }
 
-std::string json_string(std::string_view text) {
-  constexpr const char* digits = "0123456789abcdef";
-  std::string shown = "\"";
-  for (const char c : text) {
-    const auto code = static_cast<unsigned char>(c);
-    if (code < 0x20U) {
-      shown += std::string("\\u00") + digits[code >> 4U] + digits[code & 15U];
-    } else {
-      if (c == '"' || c == '\\') shown += '\\';
-      shown += c;
-    }
-  }
-  return shown + '"';
-}
-
 std::string pair_of(const Position& position) {
   return '[' + std::to_string(position.first) + ", " + std::to_string(position.second) + ']';
 }
@@ -75,7 +61,7 @@ std::string checked_game(std::string_view text, const GameError* error) {
   if (error == nullptr) return "{\"problem\": null}\n";
   const Places places = places_of(text);
   const auto [line, column] = place_of(*error, places);
-  std::string answer = "{\"problem\": {\"message\": " + json_string(error->what()) +
+  std::string answer = "{\"problem\": {\"message\": " + json_string(error->sentence()) +
                        ", \"entry\": " + json_string(error->entry()) + ", \"line\": " + std::to_string(line) +
                        ", \"column\": " + std::to_string(column) + "},\n\"places\": {";
   const char* separator = "\n";

@@ -89,7 +89,7 @@ void ExpressionReader::unroll_into(const TomlEntry& entry, const Place& place, E
     const auto [line, column] = entry.place_of(document_, error.position);
     throw GameError(
         entry.path() + ", line " + std::to_string(line) + ", column " + std::to_string(column) + ": " + error.what(),
-        entry.path(), line, column);
+        entry.path() + ": " + error.what(), entry.path(), line, column);
   }
 }
 
@@ -104,7 +104,8 @@ ExpressionCost::Text ExpressionReader::cost(const TomlEntry& entry, int i) const
 }
 
 void ExpressionReader::add_coordinates(const TomlEntry& entry, Purpose purpose, int i, PlayerExpressions& values,
-                                       std::vector<Switching::OfPlayer>& graphs) const {
+                                       std::vector<Switching::OfPlayer>& graphs,
+                                       std::vector<ExpressionCost::Text>& texts) const {
   if (!entry.present()) return;
   const std::string expected = "a text, or a list of " + std::to_string(shape_.dimension) + " texts";
   const bool is_list = entry.is_list();
@@ -116,7 +117,9 @@ void ExpressionReader::add_coordinates(const TomlEntry& entry, Purpose purpose, 
     const Place place{.shape = &shape_, .parameters = &parameters_, .purpose = purpose, .player = i, .coordinate = l};
     int node = 0;
     unroll_into(is_list ? entry.item(at(l)) : entry, place, *graph, node);
-    values.add(shape_.own_entry(shape_.host_number(i), l), shape_.host_number(i), graph, node);
+    const int slot = shape_.own_entry(shape_.host_number(i), l);
+    values.add(slot, shape_.host_number(i), graph, node);
+    texts[at(slot)] = {graph, node};
   }
   graphs.push_back({shape_.host_number(i), i, graph});
 }

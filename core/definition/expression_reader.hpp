@@ -24,9 +24,9 @@ class ExpressionReader {
   /// The cost of player i, when its table has an expression.
   [[nodiscard]] ExpressionCost::Text cost(const TomlEntry& entry, int i) const;
   /// One value for each coordinate of player i: one text in which l is the coordinate, or a list of texts. Graphs
-  /// have the switches.
+  /// have the switches; texts are at own entries.
   void add_coordinates(const TomlEntry& entry, Purpose purpose, int i, PlayerExpressions& values,
-                       std::vector<Switching::OfPlayer>& graphs) const;
+                       std::vector<Switching::OfPlayer>& graphs, std::vector<ExpressionCost::Text>& texts) const;
 
  private:
   struct Unrolled {

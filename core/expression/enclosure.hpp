@@ -14,25 +14,35 @@ class Enclosure {
   /// Of some nodes of a graph, which has to outlive it.
   Enclosure(const ExpressionGraph& graph, std::vector<int> nodes);
 
-  /// Whether all operations are, so that derivatives tell how values change.
-  [[nodiscard]] bool is_smooth() const { return is_smooth_; }
-
   enum class Definition {
     everywhere,
     convex,  ///< the points of the box at which the expressions are defined are a convex set
-    nowhere,
     unknown,
+    nowhere,
+  };
+  struct Found {
+    Definition definition = Definition::everywhere;
+    const Switch* kink = nullptr;  ///< one that may switch in the box, so that values there tell less
   };
   /// Encloses the values at all points of the box at which the expressions are defined, in the order of the nodes.
-  Definition evaluate(const std::function<Interval(const Leaf&)>& box, std::vector<Interval>& values) const;
+  /// Switches hold what their own conditions say at each point; where one is not decided, all that it can hold.
+  /// Branches that no point of the box takes need not be defined.
+  Found evaluate(const std::function<Interval(const Leaf&)>& box, std::vector<Interval>& values) const;
 
  private:
+  struct Node {
+    Interval value;
+    unsigned char form = 0;
+    Found found = {};
+  };
+  [[nodiscard]] Node of_switch(const Switch& one) const;
+  [[nodiscard]] Node of_branch(const GraphNode& node) const;
+
   const ExpressionGraph& graph_;
   std::vector<int> nodes_;
-  std::vector<int> needed_;  // ascending: operands before what is made of them
-  bool is_smooth_ = true;
-  mutable std::vector<Interval> rows_;       // by node
-  mutable std::vector<unsigned char> form_;  // by node
+  std::vector<int> needed_;    // ascending: operands before what is made of them
+  bool has_branches_ = false;  // that need not be taken
+  mutable std::vector<Node> rows_;
 };
 
 }  // namespace mixed_order_game

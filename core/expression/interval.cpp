@@ -107,6 +107,12 @@ Interval inverse(const Interval& a) {
   return {lower, upper};
 }
 
+Real least_magnitude(const Interval& a) {
+  return a.contains(0.0) ? 0.0 : std::min(std::abs(a.lower), std::abs(a.upper));
+}
+
+Real sign(Real value) { return value > 0.0 ? 1.0 : value < 0.0 ? -1.0 : 0.0; }
+
 Interval power(const Interval& a, const Interval& b) {
   const bool is_integer = b.is_point() && b.lower == std::floor(b.lower);
   if (is_integer && a.lower < 0.0) {
@@ -144,7 +150,7 @@ Interval operator*(const Interval& a, const Interval& b) {
 
 Interval square(const Interval& a) {
   const Real largest = a.magnitude();
-  const Real least = a.contains(0.0) ? 0.0 : std::min(std::abs(a.lower), std::abs(a.upper));
+  const Real least = least_magnitude(a);
   return {product(least, least).lower, product(largest, largest).upper};
 }
 
@@ -254,25 +260,48 @@ Interval enclose(Operation operation, const Interval& first, const Interval& sec
     }
     case Operation::sinh:
       return rising(a, [](Real x) { return std::sinh(x); });
-    case Operation::cosh: {
-      const Real least = a.contains(0.0) ? 0.0 : std::min(std::abs(a.lower), std::abs(a.upper));
-      return rising({least, a.magnitude()}, [](Real x) { return std::cosh(x); }, 1.0);
-    }
+    case Operation::cosh:
+      return rising({least_magnitude(a), a.magnitude()}, [](Real x) { return std::cosh(x); }, 1.0);
     case Operation::tanh:
       return rising(a, [](Real x) { return std::tanh(x); }, -1.0, 1.0);
     case Operation::erf:
       return rising(a, [](Real x) { return std::erf(x); }, -1.0, 1.0);
-    case Operation::hypot: {
-      const auto least = [](const Interval& x) {
-        return x.contains(0.0) ? 0.0 : std::min(std::abs(x.lower), std::abs(x.upper));
-      };
-      return within(
-          {about(std::hypot(least(a), least(b))).lower, about(std::hypot(a.magnitude(), b.magnitude())).upper},
-          {0.0, infinite});
+    case Operation::hypot:
+      return within({about(std::hypot(least_magnitude(a), least_magnitude(b))).lower,
+                     about(std::hypot(a.magnitude(), b.magnitude())).upper},
+                    {0.0, infinite});
+    case Operation::abs:
+      return {least_magnitude(a), a.magnitude()};
+    case Operation::min:
+      return {std::min(a.lower, b.lower), std::min(a.upper, b.upper)};
+    case Operation::max:
+      return {std::max(a.lower, b.lower), std::max(a.upper, b.upper)};
+    case Operation::floor:
+      return {std::floor(a.lower), std::floor(a.upper)};
+    case Operation::sign_of:
+      return {a.lower >= 0.0 ? 1.0 : -1.0, a.upper >= 0.0 ? 1.0 : -1.0};
+    case Operation::positive:
+      return {a.lower > 0.0 ? 1.0 : 0.0, a.upper > 0.0 ? 1.0 : 0.0};
+    case Operation::not_negative:
+      return {a.lower >= 0.0 ? 1.0 : 0.0, a.upper >= 0.0 ? 1.0 : 0.0};
+    case Operation::sign:
+      return {sign(a.lower), sign(a.upper)};
+    case Operation::choose:
+      if (!a.contains(0.0)) return b;
+      return a.is_point() ? Interval::of(0.0) : hull({Interval::of(0.0), b});
+    case Operation::multiply_unless_zero:
+      return a * b;
+    case Operation::usable:
+      return {0.0, 1.0};
+    case Operation::alternating:
+      if (a.is_point() && std::isfinite(a.lower)) return Interval::of(std::fmod(a.lower, 2.0) == 0.0 ? 1.0 : -1.0);
+      return {-1.0, 1.0};
+    case Operation::noise: {
+      constexpr Real largest = 8.3;  // the quantile of 1 - 2^-53 is 8.21
+      return {-largest, largest};
     }
-    default:
-      return {};
   }
+  return {};
 }
 
 }  // namespace mixed_order_game

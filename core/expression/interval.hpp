@@ -27,9 +27,6 @@ Interval operator-(const Interval& a, const Interval& b);
 Interval operator-(const Interval& a);
 Interval operator*(const Interval& a, const Interval& b);
 
-/// Whether derivatives of the operation tell how its values change, wherever it has any.
-constexpr bool is_smooth_operation(Operation operation) { return operation <= Operation::hypot; }
-
 /// The arguments at which an operation has a finite value, as far as intervals hold them.
 struct Domain {
   Interval a;
@@ -41,8 +38,8 @@ struct Domain {
 /// That of arguments in a and b; b is not read for functions of one value.
 Domain domain_of(Operation operation, const Interval& a, const Interval& b);
 
-/// Encloses operation(a, b) for all arguments of the domain in a and b; all numbers for operations that switch.
-/// Assumes that the library's functions err by a few units in the last place at most.
+/// Encloses operation(a, b) for all arguments of the domain in a and b. Assumes that the library's functions err by a
+/// few units in the last place at most.
 Interval enclose(Operation operation, const Interval& a, const Interval& b);
 /// a a, which is no product of two that differ.
 Interval square(const Interval& a);

@@ -24,9 +24,9 @@ std::string game(const std::string& cost, int dimension = 1, const std::string& 
 }
 
 EquilibriumVerdict verdict_of(const std::string& toml) {
-  std::vector<ExpressionCost::Text> expressions;
+  GameExpressions expressions;
   const Game read = parse_game(toml, expressions);
-  return judge_equilibrium(read.parameters, expressions);
+  return judge_equilibrium(read.parameters, expressions.costs);
 }
 
 TEST(Verdict, IsNashWhereOwnCostsAreConvexEverywhere) {
@@ -77,6 +77,47 @@ TEST(Verdict, IsOpenWithoutASecondOrderProof) {
   EXPECT_EQ(verdict.players[0].convex_within, 0.0);
 }
 
+TEST(Verdict, DecidesConditionsAwayFromTheirKinks) {
+  struct Case {
+    const char* cost;
+    Real convex_within;  // at most: the distance to the kink, or where the branch is no longer taken
+  };
+  for (const auto& [cost, convex_within] : {
+           Case{"(x[i] - 1)^2 + 0.1 * abs(x[i] - 3)", 2.05},
+           Case{"(x[i] - 1)^2 - 0.5 * max(0, x[i] - 2)^2", 1.0},
+           Case{"if(x[i] < 2, (x[i] - 1)^2, x[i])", 1.0},
+           Case{"(x[i] - 1)^2 + min(x[i], 4) * 0.1", 3.05},
+           Case{"if(x[i] > 0.5, x[i] - log(x[i]), 0.2 * x[i]^2)", 0.5},  // log is not taken below
+           Case{"(x[i] - 1)^2 * (1 + floor(x[i] / 3))", 1.0},
+           Case{"(x[i] - 1)^2 + 0.05 * sign(x[i] + 1)", 2.0},
+           Case{"(x[i] - 1)^2 + 0.05 * mod(x[i], 4)", 1.0},
+       }) {
+    const EquilibriumVerdict verdict = verdict_of(game(cost));
+    EXPECT_EQ(verdict.kind, Kind::local_nash) << cost;
+    for (const auto& player : verdict.players) {
+      EXPECT_GT(player.convex_within, 0.2) << cost;
+      EXPECT_LE(player.convex_within, convex_within) << cost;
+      EXPECT_EQ(player.kink, "") << cost;
+    }
+  }
+}
+
+TEST(Verdict, ProvesNoConvexityAcrossAKink) {
+  // each side of 0.5 is convex, both together are not
+  const EquilibriumVerdict verdict = verdict_of(game("(x[i] - 1)^2 - 0.9 * abs(x[i] - 0.5)"));
+  for (const auto& player : verdict.players) EXPECT_LE(player.convex_within, 0.96);
+}
+
+TEST(Verdict, NamesAKinkAtTheEquilibrium) {
+  // the gradient is continuous at x* = 0, and the second derivative jumps from 2 to 3
+  const EquilibriumVerdict verdict = verdict_of(game("x[i]^2 + 0.5 * max(0, x[i])^2"));
+  EXPECT_EQ(verdict.kind, Kind::open);
+  for (const auto& player : verdict.players) {
+    EXPECT_EQ(player.kink, "max(0, x[i])");
+    EXPECT_EQ(player.convex_within, 0.0);
+  }
+}
+
 TEST(Verdict, CountsEquilibria) {
   const EquilibriumVerdict verdict = verdict_of(game("(x[i]^2 - 1)^2"));
   ASSERT_FALSE(verdict.others.empty());
@@ -107,26 +148,45 @@ TEST(Verdict, NamesWhatIsNotDefinedWhereTheSearchBegins) {
 }
 
 TEST(HessianBounds, ProveConvexityOfSeveralCoordinates) {
-  std::vector<ExpressionCost::Text> expressions;
+  GameExpressions expressions;
   const Game read =
       parse_game(game("cosh(x[i,1] + x[i,2]) + x[i,1]^2 + x[i,2]^2 + 0.1 * x[i,1] * x[i,2]", 2), expressions);
-  const HessianBounds bounds(read.parameters, expressions);
+  const HessianBounds bounds(read.parameters, expressions.costs);
   const std::vector<Real> x(4, 0.0);
   EXPECT_TRUE(bounds.is_convex(0, x, 1.0));
   const Game saddle =
       parse_game(game("x[i,1]^2 + x[i,2]^2 + 1.9 * x[i,1] * x[i,2] + 0.05 * cos(x[i,1])", 2), expressions);
-  EXPECT_TRUE(HessianBounds(saddle.parameters, expressions).is_convex(0, x, 1.0));
+  EXPECT_TRUE(HessianBounds(saddle.parameters, expressions.costs).is_convex(0, x, 1.0));
   const Game above =
       parse_game(game("x[i,1]^2 + x[i,2]^2 + 1.9 * x[i,1] * x[i,2] + 0.3 * cos(x[i,1] - 3)", 2), expressions);
-  EXPECT_FALSE(HessianBounds(above.parameters, expressions).is_convex(0, x, 10.0));
+  EXPECT_FALSE(HessianBounds(above.parameters, expressions.costs).is_convex(0, x, 10.0));
+}
+
+TEST(HessianBounds, DecideBranchesOverBoxes) {
+  GameExpressions expressions;
+  const Game read = parse_game(game("(x[i] - 1)^2 + if(x[i] > 0.5, 0.1 / x[i], 0.1 * exp(x[i]))"), expressions);
+  const HessianBounds bounds(read.parameters, expressions.costs);
+  std::vector<Interval> rows;
+  const Enclosure::Found above = bounds.rows(0, {{0.6, 2.0}, {0.0, 0.0}}, rows);
+  EXPECT_EQ(above.definition, Enclosure::Definition::everywhere);
+  EXPECT_EQ(above.kink, nullptr);
+  EXPECT_TRUE(rows[0].contains(2.2));  // 2 + 0.2 / x^3 at 1
+  EXPECT_LT(rows[0].upper, 3.2);
+  const Enclosure::Found below = bounds.rows(0, {{-1.0, 0.4}, {0.0, 0.0}}, rows);  // 1 / x is not taken
+  EXPECT_EQ(below.definition, Enclosure::Definition::everywhere);
+  EXPECT_TRUE(rows[0].contains(2.1));  // 2 + 0.1 exp(x) at 0
+  const Enclosure::Found across = bounds.rows(0, {{0.4, 0.6}, {0.0, 0.0}}, rows);
+  ASSERT_NE(across.kink, nullptr);
+  EXPECT_EQ(across.kink->text, "x[i] > 0.5");
+  EXPECT_NE(bounds.rows(0, {{0.5, 0.6}, {0.0, 0.0}}, rows).kink, nullptr);  // at the edge
 }
 
 TEST(HessianBounds, EncloseTheHessian) {
-  std::vector<ExpressionCost::Text> expressions;
+  GameExpressions expressions;
   const Game read = parse_game(
       game("x[i,1]^2 + x[i,2]^2 + exp(0.3 * x[1,1] * x[2,2]) + sin(x[i,1] * x[i,2]) + 0.2 * x[1,1]^3", 2), expressions);
   const Shape& shape = read.parameters.shape;
-  const HessianBounds bounds(read.parameters, expressions);
+  const HessianBounds bounds(read.parameters, expressions.costs);
   const std::vector<Interval> box(4, {-1.0, 1.0});
   std::vector<Interval> rows;
   const SparseRows& pattern = read.parameters.cost->hessian_pattern();
@@ -136,7 +196,7 @@ TEST(HessianBounds, EncloseTheHessian) {
     for (std::size_t p = 0; p < 4; ++p) x[p] = std::sin(1.0 + 7.0 * sample + 3.0 * static_cast<Real>(p));
     read.parameters.cost->hessian_rows(x.data(), 0, hessian.data());
     for (int i = 0; i < 2; ++i) {
-      ASSERT_EQ(bounds.rows(i, box, rows), Enclosure::Definition::everywhere);
+      ASSERT_EQ(bounds.rows(i, box, rows).definition, Enclosure::Definition::everywhere);
       for (int l = 0; l < 2; ++l) {
         const auto row = at(shape.entry(i, l));
         for (int k = pattern.start[row]; k < pattern.start[row + 1]; ++k) {

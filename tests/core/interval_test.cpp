@@ -17,7 +17,7 @@ TEST(Intervals, EncloseWhatOperationsGiveAtTheirPoints) {
   testing::RandomNumbers random(3);
   std::vector<Real> numbers(6);
   int compared = 0;
-  for (int k = static_cast<int>(Operation::add); k <= static_cast<int>(Operation::hypot); ++k) {
+  for (int k = static_cast<int>(Operation::add); k <= static_cast<int>(Operation::multiply_unless_zero); ++k) {
     const auto operation = static_cast<Operation>(k);
     for (int repeat = 0; repeat < 4000; ++repeat) {
       random.fill(numbers, -3.0, 3.0);

@@ -44,6 +44,8 @@ class Equilibrium:
     convex_within: FloatArray
     """(N,): f_i is proved convex in x_i where no coordinate is farther from x* than this; infinite where it
     is so wherever it is defined, 0 where nothing is proved"""
+    kinks: tuple[str, ...]
+    """(N,): the text of a condition of f_i that switches at x*; empty without one"""
     monotonicity: float  # m, of the pseudo-gradient's Jacobian at x*
     is_affine: bool  # all costs are quadratic: m holds everywhere, and x* is the only equilibrium
     others: tuple[FloatArray, ...]  # equilibria in the same sense, (N, D) each
@@ -63,6 +65,12 @@ class Equilibrium:
                 told = "no player gains by a small move alone, by the second derivatives at x*"
             return f"x* is a local Nash equilibrium: {told}."
         open_one = int(np.argmin(np.where(self.convex_within > 0.0, np.inf, self.curvature))) + 1
+        for player, kink in enumerate(self.kinks, start=1):
+            if kink and not self.convex_within[player - 1] > 0.0:
+                return (
+                    f'The second-order condition is open: "{kink}" in the cost of player {player} switches '
+                    "at x*, where its second derivatives jump."
+                )
         return (
             "The second-order condition is open: the derivatives at x* do not tell whether the cost of "
             f"player {open_one} has a minimum along its own action there."
@@ -99,6 +107,7 @@ class Equilibrium:
             "x_star": self.x_star.tolist(),
             "curvature": self.curvature.tolist(),
             "convex_within": [each if math.isfinite(each) else None for each in self.convex_within.tolist()],
+            "kinks": list(self.kinks),
             "monotonicity": self.monotonicity,
             "is_affine": self.is_affine,
             "others": [each.tolist() for each in self.others],
@@ -121,11 +130,12 @@ def judge_equilibrium(game: GameSource) -> Equilibrium | None:
         return _judged(source)
     with temporary_folder(BuildError) as folder:
         file = folder / "game.toml"
-        file.write_bytes(_game_in(source))
+        file.write_bytes(game_in(source))
         return _judged(file)
 
 
-def _game_in(fmu: Path) -> bytes:
+def game_in(fmu: Path) -> bytes:
+    """The game file that an FMU holds. Raises ModelError."""
     import zipfile
 
     try:
@@ -159,6 +169,7 @@ def _judged(game: Path) -> Equilibrium | None:
         x_star=np.array(told["x_star"]),
         curvature=np.array(told["curvature"]),
         convex_within=np.array([math.inf if each is None else each for each in told["convex_within"]]),
+        kinks=tuple(told["kinks"]),
         monotonicity=told["monotonicity"],
         is_affine=told["is_affine"],
         others=tuple(np.array(each) for each in told["others"]),
