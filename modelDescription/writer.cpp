@@ -6,8 +6,10 @@
 #include <filesystem>
 #include <fstream>
 #include <iostream>
+#include <iterator>
 #include <string>
 
+#include "constants.hpp"
 #include "errors.hpp"
 #include "game_check.hpp"
 #include "judgement.hpp"
@@ -20,7 +22,8 @@ using namespace mixed_order_game;
 namespace {
 
 constexpr const char* usage =
-    "usage: mixed-order-game-description [[--output FILE] [--extra FOLDER] | --check | --judge] GAME.toml\n"
+    "usage: mixed-order-game-description [[--output FILE] [--extra FOLDER] | --check | --judge | --constants] "
+    "GAME.toml\n"
     "\n"
     "Writes modelDescription.xml of a game to standard output.\n"
     "\n"
@@ -28,6 +31,9 @@ constexpr const char* usage =
     "  -e, --extra FOLDER  write reference results below FOLDER, unless the run is long or fails\n"
     "  -c, --check         only check the game: what is wrong with it, and where, in JSON on standard output\n"
     "  -j, --judge         write what is known of its Nash equilibrium, as JSON, to standard output\n"
+    "  -k, --constants     write the constants of the theorems over a box, as JSON, to standard output; standard "
+    "input\n"
+    "                      has the request, in TOML: box = [[LOWER, UPPER], ...] and settings = { \"NAME\" = VALUE }\n"
     "  -h, --help          show this text\n"
     "\n"
     "Exit code: 0 fine, 1 the game is not valid or a file cannot be read or written, 2 wrong usage.\n";
@@ -74,14 +80,19 @@ Exit check(const std::string& toml) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  const option options[] = {{"output", required_argument, nullptr, 'o'}, {"extra", required_argument, nullptr, 'e'},
-                            {"check", no_argument, nullptr, 'c'},        {"judge", no_argument, nullptr, 'j'},
-                            {"help", no_argument, nullptr, 'h'},         {}};
+  const option options[] = {{"output", required_argument, nullptr, 'o'},
+                            {"extra", required_argument, nullptr, 'e'},
+                            {"check", no_argument, nullptr, 'c'},
+                            {"judge", no_argument, nullptr, 'j'},
+                            {"constants", no_argument, nullptr, 'k'},
+                            {"help", no_argument, nullptr, 'h'},
+                            {}};
   std::string output;
   std::string extra;
   bool check_only = false;
   bool judge_only = false;
-  for (int option = 0; (option = getopt_long(argc, argv, "o:e:cjh", options, nullptr)) != -1;) {
+  bool constants_only = false;
+  for (int option = 0; (option = getopt_long(argc, argv, "o:e:cjkh", options, nullptr)) != -1;) {
     switch (option) {
       case 'o':
         output = optarg;
@@ -95,6 +106,9 @@ int main(int argc, char** argv) {
       case 'j':
         judge_only = true;
         break;
+      case 'k':
+        constants_only = true;
+        break;
       case 'h':
         std::cout << usage;
         return fine;
@@ -103,7 +117,7 @@ int main(int argc, char** argv) {
         return wrong_usage;
     }
   }
-  const int ways = int{check_only} + int{judge_only} + int{!output.empty() || !extra.empty()};
+  const int ways = int{check_only} + int{judge_only} + int{constants_only} + int{!output.empty() || !extra.empty()};
   if (optind + 1 != argc || ways > 1) {
     std::cerr << usage;
     return wrong_usage;
@@ -119,8 +133,9 @@ int main(int argc, char** argv) {
       return failure;
     }
     if (check_only) return check(toml);
-    if (judge_only) {
-      std::cout << judgement(toml) << std::flush;
+    if (judge_only || constants_only) {
+      const auto request = [] { return std::string(std::istreambuf_iterator<char>(std::cin), {}); };
+      std::cout << (judge_only ? judgement(toml) : constants(toml, request())) << std::flush;
       if (!std::cout) throw Error("cannot write to standard output");
       return fine;
     }

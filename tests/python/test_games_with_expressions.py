@@ -190,9 +190,14 @@ def test_what_reads_coefficients_refuses(function: object, fmu: Path) -> None:
         of_dynamics.unknown_dynamics(of_dynamics.x0)
 
 
-def test_tune_refuses(fmu: Path) -> None:
-    with pytest.raises(mog.GameError, match="tune reads costs as coefficients; " + COST):
-        tune(fmu, 2.0)
+def test_tune_searches_on_the_loop_near_the_equilibrium(fmu: Path) -> None:
+    found = tune(fmu, 1.5, start_values={"perturbed": False}, seed=2)
+    assert found.met
+    assert found.settling_time <= 1.5
+    # the rate told is that of the linearization by differences, with the gains that were found
+    with mog.Simulator(fmu) as simulator:
+        loop = linearized_loop(simulator, dict(found.gains))
+    assert found.slowest_rate == pytest.approx(-loop.abscissa, rel=1e-6)
 
 
 def test_the_unknown_term_is_that_of_the_formulas_by_hand(fmu: Path) -> None:

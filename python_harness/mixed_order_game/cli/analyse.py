@@ -22,6 +22,13 @@ def analyse(
     radius: Annotated[
         float, typer.Option(help="Distance to the equilibrium that the designed gains guarantee.")
     ] = 0.1,
+    box: Annotated[
+        float | None,
+        typer.Option(
+            help="Of games with expressions: constants hold where every action is within this distance of x*;"
+            " by default as far as the starts, if proved there.",
+        ),
+    ] = None,
     tables: Annotated[
         bool, typer.Option("--tables", help="Print every figure and hypothesis after the verdicts.")
     ] = False,
@@ -36,6 +43,8 @@ def analyse(
 
     mog analyse my_game.toml --no-simulation --json
 
+    mog analyse cournot_isoelastic --box 0.5
+
     mog analyse --no-square --radius 0.01 --set k3=100
     """
     from ..theory.analysis import analyse as run_analysis
@@ -48,6 +57,7 @@ def analyse(
             simulation=simulation,
             square=square,
             radius=radius,
+            box=box,
             progress=show,
         )
     if as_json:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ..errors import GameError
 from ..fmu.model import Model, Value
+from .bounds import GameBounds
 from .definition import (
     Expressions,
     Table,
@@ -54,6 +55,9 @@ class GameParameters:
     disturbance_bound: FloatArray  # (N, D), |bias| + |amplitude|, at least max_t |d_il(t)|
     expressions: Expressions  # which costs, dynamics and disturbances these coefficients are not all of
     x_star: FloatArray | None  # (N, D), of the FMU; needed where costs have expressions
+    jacobian: FloatArray | None = None
+    """(N D, N D), of the pseudo-gradient at x*, by player, then by coordinate; likewise"""
+    bounds: GameBounds | None = None  # what is proved over a box, likewise
 
     @property
     def players(self) -> int:

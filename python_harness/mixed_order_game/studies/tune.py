@@ -1,7 +1,8 @@
 """Gains that settle in a wished time with little control energy, on one graph or on all graphs of a set.
 
-First the loop of Theorem 2 alone, which is linear: its settling time by the matrix exponential and its
-control energy by a Lyapunov equation cost milliseconds, and SciPy's differential evolution searches there.
+First the loop of Theorem 2 alone, which is linear, for costs with expressions near x*: its settling time by
+the matrix exponential and its control energy by a Lyapunov equation cost milliseconds, and SciPy's
+differential evolution searches there.
 Then the real loop, through the FMU: the wish is tightened until every graph's run meets it, and a few dozen
 runs of Nelder and Mead's simplex lower the energy further. What is returned was simulated on every graph.
 The linear loop knows no perturbation, so a largest error at the end is sought by the simplex alone.
@@ -18,13 +19,13 @@ from ..arguments import number_argument
 from ..errors import MixedOrderGameError, SimulationError
 from ..fmu.build import GameSource
 from ..fmu.model import Model, Value, check_value
-from ..game.definition import require_coefficients
 from ..game.graphs import CommunicationGraph, graph_of
 from ..game.parameters import GameParameters, game_parameters
 from ..interrupts import noted_signals
 from ..notebook import digits, page, paragraph, table
 from ..results.metrics import METRIC_UNITS, SETTLED, Metrics
-from ..theory.spectrum import initial_deviation, linear_loop, spectral_abscissa
+from ..theory.linearized import gradient_jacobian, linearized_loop
+from ..theory.spectrum import initial_deviation, linear_loop, owners, spectral_abscissa
 from .designs import Range
 from .pool import Case, open_pool, run_cases
 from .sampler import Sampler, Settings
@@ -355,15 +356,15 @@ class _Search:
                 raise TuneError(f"the range of {name} does not begin above 0")
             check_value(model.variable(name), each.low)
             check_value(model.variable(name), each.high)
-        require_coefficients(model.expressions, "tune", "cost")
-        self.game = game_parameters(model, self.fixed)
+        self.game = self._game()
         self.graphs = (graph_of(self.game.adjacency),) if graphs is None else tuple(graphs)
         if not self.graphs:
             raise TuneError("there is no graph to tune for")
         self.edges = [{}] if graphs is None else [graph.start_values(model) for graph in self.graphs]
         self.loops = [graph.adjacency for graph in self.graphs]
         self.deviation = initial_deviation(self.game)
-        largest = float(np.abs(self.deviation[: self.game.players]).max())
+        self.actions = len(owners(self.game))
+        largest = float(np.abs(self.deviation[: self.actions]).max())
         rounding = 1e-12 * (1.0 + float(np.abs(self.game.x0).max()))
         if band is None and largest <= rounding:
             raise TuneError("every player starts at its equilibrium: give the band that counts as settled")
@@ -371,6 +372,18 @@ class _Search:
         if self.band <= 0.0:
             raise TuneError(f"the band {self.band:g} is not positive")
         self.start = {name: float(model.start_values(self.fixed)[name]) for name in self.names}
+
+    def _game(self) -> GameParameters:
+        """What the linear loop takes: x* and the Jacobian there, too, where a cost has an expression."""
+        model = self.sampler.model
+        game = game_parameters(model, self.fixed)
+        if "cost" not in model.expressions:
+            return game
+        loop = linearized_loop(self.sampler, self.fixed)
+        if not np.isfinite(loop.x_star).all():
+            raise TuneError(f"{model.path}: the FMU knows no Nash equilibrium with these values")
+        jacobian = gradient_jacobian(loop, model, model.start_values(self.fixed))
+        return replace(game, x_star=loop.x_star, jacobian=jacobian)
 
     def run(self, seed: int, progress: Progress) -> Tuned:
         """Both stages, or what is known when Ctrl-C comes."""
@@ -430,7 +443,7 @@ class _Search:
     @property
     def small(self) -> bool:
         """Whether an evaluation of the linear loop costs milliseconds."""
-        return self.game.players * (self.game.players + 2) <= LARGEST_DENSE
+        return self.actions * (self.game.players + 2) <= LARGEST_DENSE
 
     def _robust(self, seed: int, progress: Progress) -> tuple[FloatArray, list[Metrics | None]]:
         """Points of the linear stage until one of them meets the wish in simulation, or the best of them."""
@@ -520,19 +533,18 @@ class _Search:
         step = expm(loop * (target / WINDOW))
         largest = 0.0
         for _ in range(WINDOW + 1):
-            largest = max(largest, float(np.abs(state[: self.game.players]).max()))
+            largest = max(largest, float(np.abs(state[: self.actions]).max()))
             state = step @ state
         return float(np.log(max(largest, np.finfo(float).tiny) / self.band))
 
     def _stepped(self, loop: FloatArray, target: float) -> tuple[float, float]:
         """Energy and overrun of a large loop, by steps of a hundredth of the target time."""
-        players = self.game.players
         control = loop[_driven(self.game)]
         states = np.array(list(stiff_response(loop, self.deviation, target / STEPS, 2 * STEPS)))
         with np.errstate(over="ignore", invalid="ignore"):
             power = np.square(np.einsum("cn,tnl->tcl", control, states)).sum(axis=(1, 2))
             energy = 0.5 * float(np.sum(power[1:] + power[:-1])) * target / STEPS
-            largest = float(np.abs(states[STEPS:, :players]).max())
+            largest = float(np.abs(states[STEPS:, : self.actions]).max())
         if not (np.isfinite(energy) and np.isfinite(largest)):
             return float(np.exp(UNSTABLE / 10.0)), UNSTABLE
         return energy, float(np.log(max(largest, np.finfo(float).tiny) / self.band))
@@ -665,7 +677,8 @@ def stiff_response(loop: FloatArray, deviation: FloatArray, step: float, steps: 
 
 def _driven(game: GameParameters) -> NDArray[np.int_]:
     """Rows of M whose derivative is the control: x_i of order 1, v_i of order 2."""
-    return np.where(game.first_order, 0, game.players) + np.arange(game.players)
+    of = owners(game)
+    return np.where(game.first_order[of], 0, len(of)) + np.arange(len(of))
 
 
 def _require_common_gains(model: Model) -> None:

@@ -26,12 +26,13 @@ def analyse(
     simulation: bool = True,
     square: bool = True,
     radius: float = 0.1,
+    box: float | None = None,
     progress: Progress | None = None,
 ) -> Analysis:
     """Judge a game's gains: thresholds of the theorems, exact spectrum, guaranteed radius, and runs.
 
-    Of a game whose costs, dynamics or disturbances have expressions, the loop linearized at x* alone is
-    analysed; simulation and radius then do nothing.
+    Of a game whose costs, dynamics or disturbances have expressions, the loop linearized at x* is analysed,
+    and the theorems with constants that are proved over a box around x*; simulation then does nothing.
 
     Parameters
     ----------
@@ -46,6 +47,9 @@ def analyse(
         False: the same game with the square terms of the unknown dynamics removed.
     radius
         lim sup of |x - x*| that the designed gains are to guarantee, in the game's length unit.
+    box
+        Of games with expressions: constants hold where every action is within this distance of x*, in each
+        coordinate; by default as far as the starts, nearer where m > 0 is not proved there.
     progress
         Called with the name of a step and the part of it done, 0 to 1.
 
@@ -57,8 +61,8 @@ def analyse(
     Raises
     ------
     GameError
-        For a game that is missing, is none or has no unique Nash equilibrium, and for a radius that is not
-        positive.
+        For a game that is missing, is none or has no unique Nash equilibrium, and for a radius or box
+        that is not positive; for a box of a game of coefficients, which needs none.
     ModelError, BuildError, VariableError, SimulationError
         As reading, building and running do.
 
@@ -69,6 +73,8 @@ def analyse(
     -2.096
     """
     radius = number_argument(radius, "radius", GameError)
+    if box is not None:
+        box = number_argument(box, "box", GameError)
     if not (math.isfinite(radius) and radius > 0.0):
         raise GameError(f"radius = {radius:g} is not positive")
     source = source_of(game)
@@ -77,7 +83,9 @@ def analyse(
     if expression:
         if not square:
             raise GameError(f"{source}: only coefficients have a square term to remove; {expression}")
-        return local_analysis(file, source, changes or {})
+        return local_analysis(file, source, changes or {}, box=box, radius=radius)
+    if box is not None:
+        raise GameError(f"{source}: its costs and dynamics are of coefficients, whose constants need no box")
     with nullcontext(file) if square else _without_square(file) as file:
         analyst = Analyst(
             replace(read_game(file, changes), path=source),

@@ -47,6 +47,9 @@ K1_MARGIN = 2.0
 """k1: k4* falls as k1 rises above its own."""
 
 
+ROUNDING = 1e-12
+"""Relative distance that a level keeps from the largest one, so that rounding carries no ball across it."""
+
 LARGEST = 1e300
 """Stands for infinity in searches, which subtract what they compare."""
 
@@ -97,6 +100,12 @@ class Certificate:
     def estimate_radius(self, level: float) -> float:
         """Largest |y_i - x*| with V <= level: sqrt(level (2 + 1/p)), from |y_i - xbar| + |xbar - x*|."""
         return math.sqrt(level * (2.0 + 1.0 / self.weights.estimates))
+
+    def level_within(self, reach: float, *, tracking: bool = True) -> float:
+        """Largest level whose set has |xbar - x*|, |y_i - x*| and, with tracking, |x - x*| at most reach."""
+        radii = [math.sqrt(2.0), self.estimate_radius(1.0)]
+        largest = max(*radii, self.action_radius(1.0) if tracking else 0.0)
+        return (reach / largest) ** 2 * (1.0 - ROUNDING)
 
 
 def comparison_matrix(

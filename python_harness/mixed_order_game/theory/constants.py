@@ -2,6 +2,10 @@
 
 Everything is that of one coordinate where coordinates do not interact: a matrix h (N, N) acting on D
 coordinates alike is h (x) I_D and has the same norm.
+
+Where costs have expressions the Jacobian of the gradients varies. Over a box it is a matrix h in the middle
+plus one whose entries have bounds, and a norm is at most that of h plus that of these bounds: the mean values
+of the Jacobian between two joint actions of the box lie within the same bounds, as the box is convex.
 """
 
 import math
@@ -10,7 +14,9 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import block_diag
 
+from ..game.bounds import GameBounds
 from ..game.definition import require_coefficients
 from ..game.parameters import GameParameters
 from .graph import consensus_eigenvalues, consensus_norm, laplacian
@@ -18,17 +24,22 @@ from .spectrum import gradient_map, monotonicity_constant, nash_equilibrium
 
 FloatArray = NDArray[np.float64]
 
+ROUNDING = 1e-12
+"""By what a ball may seem to exceed its box."""
+
 
 @dataclass(frozen=True, eq=False)
 class LoopConstants:
     """Constants of costs and graph. n of the N players are of order 1; f and s name the two groups.
 
     grad_i f_i(x) = sum_j h_ij x_j + l_i; B (N, N^2) is the map y -> [h_i y_i]_i of the estimates,
-    E = 1_N (x) I (N^2, N), so that B E = h; M = L (x) I + A_0.
+    E = 1_N (x) I (N^2, N), so that B E = h; M = L (x) I + A_0. Over a box h and B are those in the middle,
+    of all N D actions, and `variation` bounds what the Jacobian differs from h by.
     """
 
     parameters: GameParameters
-    h: FloatArray  # (N, N), the gradient map
+    h: FloatArray  # (N, N), the gradient map; (N D, N D) over a box
+    variation: FloatArray  # of the same size, zero for quadratic costs
     monotonicity: float  # m of Assumption 3
     lipschitz: FloatArray  # (N,), l_i of Assumption 1
     eigenvalues: FloatArray  # (N, N), of L + diag(a_.j), row j
@@ -36,7 +47,21 @@ class LoopConstants:
     @property
     def players(self) -> int:
         """N."""
-        return len(self.h)
+        return self.parameters.players
+
+    def _rows(self, players: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Rows of h that belong to some of the players."""
+        return np.repeat(players, len(self.h) // self.players)
+
+    def _norm(self, players: NDArray[np.bool_]) -> float:
+        """Largest norm of these players' rows."""
+        rows = self._rows(players)
+        return float(np.linalg.norm(self.h[rows], 2) + np.linalg.norm(self.variation[rows], 2))
+
+    def _estimates_variation(self, players: NDArray[np.bool_]) -> float:
+        """Bound of what B differs by from the one in the middle, of these players' rows."""
+        blocks = self.variation.reshape(self.players, -1, len(self.h))[players]
+        return float(np.linalg.norm(blocks, 2, axis=(1, 2)).max(initial=0.0))
 
     @property
     def dimension(self) -> int:
@@ -78,12 +103,12 @@ class LoopConstants:
     @property
     def pseudo_gradient_norm(self) -> float:
         """||h||, the Lipschitz constant of the pseudo-gradient; the paper bounds it by sqrt(N) max l_i."""
-        return float(np.linalg.norm(self.h, 2))
+        return self._norm(np.ones(self.players, dtype=bool))
 
     @property
     def first_rows_norm(self) -> float:
         """||h_f||, Lipschitz constant of the rows of order 1; 0 if there are none."""
-        return float(np.linalg.norm(self.h[self.first], 2)) if self.first_players else 0.0
+        return self._norm(self.first) if self.first_players else 0.0
 
     @property
     def first_lipschitz(self) -> float:
@@ -109,13 +134,21 @@ class LoopConstants:
 
         M'(e_i (x) h_i) = (L'e_i) (x) h_i + e_i (x) (a_i. o h_i), so each row costs N^2 numbers.
         """
+        if not self.second_players:
+            return 0.0
         A = self.parameters.adjacency
         L = laplacian(A)
+        coordinates = len(self.h) // self.players
         rows = [
-            (np.outer(L[i], self.h[i]) + np.outer(np.eye(self.players)[i], A[i] * self.h[i])).ravel()
+            (
+                np.outer(L[i], self.h[row])
+                + np.outer(np.eye(self.players)[i], np.repeat(A[i], coordinates) * self.h[row])
+            ).ravel()
             for i in np.flatnonzero(~self.first)
+            for row in range(i * coordinates, (i + 1) * coordinates)
         ]
-        return float(np.linalg.norm(np.array(rows), 2)) if rows else 0.0
+        varying = self._estimates_variation(~self.first) * self.fastest_consensus
+        return float(np.linalg.norm(np.array(rows), 2)) + varying
 
     @cached_property
     def estimate_pull(self) -> float:
@@ -125,9 +158,9 @@ class LoopConstants:
         [[Y'X, Y'Y], [X'X, X'Y]] / 2 = [[h, diag(l_i^2)], [N I, h']] / 2, of size 2 N.
         """
         N = self.players
-        squares = np.diag(self.lipschitz**2)
-        small = 0.5 * np.block([[self.h, squares], [N * np.eye(N), self.h.T]])
-        return max(0.0, float(np.linalg.eigvals(small).real.max()))
+        small = 0.5 * np.block([[self.h, self._squares], [N * np.eye(len(self.h)), self.h.T]])
+        varying = math.sqrt(N) * self._estimates_variation(np.ones(N, dtype=bool))
+        return max(0.0, float(np.linalg.eigvals(small).real.max()) + varying)
 
     def estimate_coupling(self, p: float) -> float:
         """||2 p E h - B'||, factor of k2 |y - 1 (x) xbar| |xbar - x*| in (V_1 + p |y - 1 (x) xbar|^2)'.
@@ -136,24 +169,41 @@ class LoopConstants:
         B B' = diag(l_i^2) and B E = h. The paper's bound is max l_i (1 + 2 p N).
         """
         hh = self.h @ self.h
-        gram = (
-            np.diag(self.lipschitz**2)
-            - 2.0 * p * (hh + hh.T)
-            + 4.0 * p * p * self.players * self.h.T @ self.h
-        )
-        return math.sqrt(max(0.0, float(np.linalg.eigvalsh(gram)[-1])))
+        gram = self._squares - 2.0 * p * (hh + hh.T) + 4.0 * p * p * self.players * self.h.T @ self.h
+        everyone = np.ones(self.players, dtype=bool)
+        varying = self._estimates_variation(everyone)
+        if varying > 0.0:
+            varying += 2.0 * p * math.sqrt(self.players) * float(np.linalg.norm(self.variation, 2))
+        return math.sqrt(max(0.0, float(np.linalg.eigvalsh(gram)[-1]))) + varying
+
+    @cached_property
+    def _squares(self) -> FloatArray:
+        """B B': the rows of different players act on different estimates."""
+        blocks = self.h.reshape(self.players, -1, len(self.h))
+        return np.asarray(block_diag(*(block @ block.T for block in blocks)))
 
 
 def loop_constants(parameters: GameParameters) -> LoopConstants:
-    """Constants of a game with quadratic costs.
+    """Constants of a game with quadratic costs, or over the box of its bounds.
 
     l_i = ||h_i||: grad_i f_i(x) = (h_i (x) I_D) x + l_i, so this Lipschitz constant is the smallest one.
     """
-    h = gradient_map(parameters)
     eigenvalues = consensus_eigenvalues(parameters.adjacency)
+    bounds = parameters.bounds
+    if bounds is not None:
+        return LoopConstants(
+            parameters=parameters,
+            h=bounds.gradients.middle,
+            variation=bounds.gradients.radius,
+            monotonicity=bounds.monotonicity,
+            lipschitz=bounds.gradients.lipschitz,
+            eigenvalues=_without_rounding(eigenvalues, eigenvalues),
+        )
+    h = gradient_map(parameters)
     return LoopConstants(
         parameters=parameters,
         h=h,
+        variation=np.zeros_like(h),
         monotonicity=float(_without_rounding(np.array(monotonicity_constant(parameters)), h)),
         lipschitz=np.asarray(np.linalg.norm(h, axis=1)),
         eigenvalues=_without_rounding(eigenvalues, eigenvalues),
@@ -198,7 +248,10 @@ def dynamics_constants(
     the first difference costs the norm of the columns f of the Jacobian; from xbar to y_i all change. With
     |dg_il/dx_jl| = |G + 2 H x_jl| <= |G + 2 H x*_jl| + 2 |H| r entrywise, the norm of the matrix of bounds
     is a bound of the norm. The paper takes sqrt(n) max eta_i and sqrt(N - n) max eta_i for the columns f.
+    The bounds over a box serve balls that lie in it; beyond them nothing is known, and all are infinite.
     """
+    if parameters.bounds is not None:
+        return _over_box(parameters, parameters.bounds, max(action_radius, estimate_radius))
     require_coefficients(parameters.expressions, "a Lipschitz constant of g", "dynamics")
     x_star = nash_equilibrium(parameters)
     first = parameters.first_order
@@ -229,11 +282,36 @@ def dynamics_constants(
     )
 
 
+def _over_box(parameters: GameParameters, bounds: GameBounds, radius: float) -> DynamicsConstants:
+    first = parameters.first_order
+    if radius > bounds.reach * (1.0 + ROUNDING) or not np.isfinite(bounds.dynamics.lipschitz).all():
+        return DynamicsConstants(
+            np.full(parameters.players, math.inf), math.inf, math.inf, math.inf, math.inf
+        )
+    largest = np.abs(bounds.dynamics.middle) + bounds.dynamics.radius
+    rows = np.repeat(first, parameters.dimension)
+
+    def norm(matrix: FloatArray) -> float:
+        return float(np.linalg.norm(matrix, 2)) if matrix.size else 0.0
+
+    own = bounds.dynamics.lipschitz
+    return DynamicsConstants(
+        lipschitz=own,
+        first_tracking=norm(largest[rows][:, rows]),
+        second_tracking=norm(largest[~rows][:, rows]),
+        first_estimates=float(own[first].max(initial=0.0)),
+        second_estimates=float(own[~first].max(initial=0.0)),
+    )
+
+
 def dynamics_bound(parameters: GameParameters, radius: float) -> FloatArray:
     """A bound (N, D) of |g_il(y)| for |y - x*| <= r: |g_il(x*)| + r |G_il + 2 H_il x*| + r^2 max_j |H_ijl|.
 
-    Exact for linear g.
+    Exact for linear g. The bounds over a box serve balls that lie in it.
     """
+    if parameters.bounds is not None:
+        known = radius <= parameters.bounds.reach * (1.0 + ROUNDING)
+        return np.where(known, parameters.bounds.dynamics_size, math.inf)
     require_coefficients(parameters.expressions, "a bound of g", "dynamics")
     x_star = nash_equilibrium(parameters)
     slope = parameters.dynamics_linear + 2.0 * parameters.dynamics_square * x_star[np.newaxis]

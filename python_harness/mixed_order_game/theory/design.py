@@ -97,6 +97,29 @@ def sharper_design(game: AnalysedGame, *, k2: float, radius: float, tracking_bou
     return _finished(game, gains, Certificate(constants, weights, proved), level, radius)
 
 
+def design_within(game: AnalysedGame, *, k2: float, radius: float, reach: float) -> Design:
+    """A design by the comparison matrix on the largest sublevel set in the balls |y - x*| <= reach.
+
+    For games whose constants are those of a box; whether the set holds the initial state is not asked.
+    Raises ArithmeticError if no gains do.
+    """
+    constants = loop_constants(game.parameters)
+    local = dynamics_constants(game.parameters, reach, reach)
+    thresholds = sufficient_gains(constants, local, k2, rate=k2 * constants.monotonicity, margin=K3_MARGIN)
+    if not math.isfinite(max(thresholds.k1, thresholds.k3, thresholds.k4)):
+        raise ArithmeticError("no gains found: the constants that the thresholds need are not all proved")
+    gains = replace(
+        game.gains,
+        k1=max(K1_MARGIN * thresholds.k1, k2),
+        k2=k2,
+        k3=K3_MARGIN * thresholds.k3,
+        k4=max(MARGIN * thresholds.k4, k2),
+    )
+    proved = proved_rate(constants, local, gains, thresholds.weights)
+    certificate = Certificate(constants, thresholds.weights, proved)
+    return _finished(game, gains, certificate, certificate.level_within(reach), radius)
+
+
 def paper_design(game: AnalysedGame, *, radius: float, factor: float = 1.1) -> Design:
     """A design by the paper's own coefficients of Theorem 1; epsilon and beta by the sharper level.
 

@@ -31,16 +31,23 @@ class LoopErrors:
 
 
 def loop_errors(
-    parameters: GameParameters, x: FloatArray, v: FloatArray, z: FloatArray, y: FloatArray
+    parameters: GameParameters,
+    x: FloatArray,
+    v: FloatArray,
+    z: FloatArray,
+    y: FloatArray,
+    gradient: FloatArray | None = None,
 ) -> LoopErrors:
     """Errors of states: x, v, z (T, N, D), y (T, N, N, D); v of order 1 and z of order 2 are ignored.
 
-    xbar_i = z_i (order 1) or x_i (order 2); vbar_i = v_i + k2 grad_i f_i(y_i) for order 2.
+    gradient (T, N, D): grad_i f_i(y_i), which quadratic costs tell themselves. xbar_i = z_i (order 1) or x_i
+    (order 2); vbar_i = v_i + k2 grad_i f_i(y_i) for order 2.
     """
     x_star = nash_equilibrium(parameters)
     first = parameters.first_order
     xbar = np.where(first[:, np.newaxis], z, x)
-    gradient = np.einsum("ij,tijl->til", gradient_map(parameters), y) + parameters.cost_linear
+    if gradient is None:
+        gradient = np.einsum("ij,tijl->til", gradient_map(parameters), y) + parameters.cost_linear
     vbar = (v + parameters.k2 * gradient)[:, ~first]
     difference = y - xbar[:, np.newaxis]
 
@@ -60,7 +67,8 @@ def loop_errors(
 def initial_errors(parameters: GameParameters) -> LoopErrors:
     """Errors of the game's initial state, (1,) each. vbar_s(0) grows with k2, also where v(0) = 0."""
     p = parameters
-    return loop_errors(p, p.x0[np.newaxis], p.v0[np.newaxis], p.z0[np.newaxis], p.y0[np.newaxis])
+    gradient = None if p.bounds is None else p.bounds.first_gradients[np.newaxis]
+    return loop_errors(p, p.x0[np.newaxis], p.v0[np.newaxis], p.z0[np.newaxis], p.y0[np.newaxis], gradient)
 
 
 @dataclass(frozen=True)

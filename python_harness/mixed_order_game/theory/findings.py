@@ -6,6 +6,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from ..game.bounds import GameBounds
 from ..notebook import digits, folded, listed, page, table
 from .constants import LoopConstants
 from .design import Design
@@ -62,6 +63,7 @@ class Analysis:
     constants: LoopConstants | None  # None for games with expressions
     exact: ExactLoop | None  # None for games too large for the dense loop, or with expressions
     runs: Mapping[str, Seen]  # "robust" and "plain", with the game's own gains
+    bounds: GameBounds | None = None  # of games with expressions
 
     def __repr__(self) -> str:
         return f"<Analysis {self.title}: {len(self.verdicts)} verdicts>"
@@ -112,6 +114,7 @@ class Analysis:
                 "b": c.paper_b,
                 "consensus_eigenvalues": c.eigenvalues.tolist(),
             },
+            "box": None if self.bounds is None else _box(self.bounds),
             "rows": [plain(asdict(row)) for row in self.rows],
             "hypotheses": [plain(asdict(hypothesis)) for hypothesis in self.hypotheses],
             "demonstrations": [
@@ -131,3 +134,22 @@ class Analysis:
             ],
             "verdicts": list(self.verdicts),
         }
+
+
+def _box(bounds: GameBounds) -> dict[str, Any]:
+    def numbers(values: Any) -> Any:
+        return [numbers(each) for each in values] if isinstance(values, list) else finite_or_none(values)
+
+    return {
+        "lower": bounds.box.lower.tolist(),
+        "upper": bounds.box.upper.tolist(),
+        "monotonicity": finite_or_none(bounds.monotonicity),
+        "sampled_monotonicity": finite_or_none(bounds.sampled_monotonicity),
+        "lipschitz": numbers(bounds.gradients.lipschitz.tolist()),
+        "sampled_lipschitz": numbers(bounds.gradients.sampled.tolist()),
+        "dynamics_lipschitz": numbers(bounds.dynamics.lipschitz.tolist()),
+        "sampled_dynamics_lipschitz": numbers(bounds.dynamics.sampled.tolist()),
+        "dynamics_size": numbers(bounds.dynamics_size.tolist()),
+        "disturbance_size": numbers(bounds.disturbance_size.tolist()),
+        "open": list(bounds.open),
+    }

@@ -71,8 +71,18 @@ def read_game(path: Path | str, changes: Mapping[str, Value] | None = None) -> A
     VariableError for a change that the FMU would not take.
     """
     path = source_of(path)
-    model = read_model(fmu_of(path))
-    require_coefficients(model.expressions, ANALYSIS)
+    fmu = fmu_of(path)
+    require_coefficients(read_model(fmu).expressions, ANALYSIS)
+    return replace(game_of_fmu(fmu, changes), path=path)
+
+
+def game_of_fmu(path: Path, changes: Mapping[str, Value] | None = None) -> AnalysedGame:
+    """The game of an FMU with start values changed; of expressions its parameters tell nothing but where.
+
+    Raises GameError where the theorems' gains, networks or graphs are others than the game's, ModelError for
+    a broken FMU, VariableError for a change that the FMU would not take.
+    """
+    model = read_model(path)
     _require_alike(model.game)
     values = model.start_values(changes)
     parameters = game_parameters(model, changes)

@@ -1,4 +1,4 @@
-"""The analysis of a game with expressions: near x*, where its loop is linear."""
+"""The analysis of a game with expressions: near x*, where its loop is linear, and over a box around x*."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -9,17 +9,17 @@ from ..errors import GameError
 from ..fmu.model import Value
 from ..fmu.run import Simulator
 from ..game.definition import PARTS, Expressions
+from .box_analysis import box_analysis
 from .findings import Analysis, Row
 from .linearized import gradient_jacobian, linearized_loop
 
-OPEN = (
-    "Theorems 1 and 2 are not judged and no gains are designed: they ask for constants on a whole set, which "
-    "are not computed from expressions."
-)
 
+def local_analysis(
+    fmu: Path, source: Path, changes: Mapping[str, Value], *, box: float | None, radius: float
+) -> Analysis:
+    """Spectrum and monotonicity at x*, said to be local, and the theorems with the constants of a box.
 
-def local_analysis(fmu: Path, source: Path, changes: Mapping[str, Value]) -> Analysis:
-    """Spectrum and monotonicity at x*, said to be local. source is what the user named.
+    source is what the user named; box and radius are those of `box_analysis`.
 
     Raises ModelError and SimulationError as linearized_loop does, GameError if there is no such x*.
     """
@@ -40,23 +40,25 @@ def local_analysis(fmu: Path, source: Path, changes: Mapping[str, Value]) -> Ana
         Row("local", "stable", abscissa < 0.0, "1", f"unperturbed loop exponentially stable{where}"),
         Row("local", "slowest rate", -abscissa, "1/s", "minus the spectral abscissa"),
     )
+    found = box_analysis(fmu, loop.x_star, changes, box=box, radius=radius)
     kind = "strongly monotone" if monotonicity > 0.0 else "not strongly monotone"
     verdicts = (
         _subject(model.expressions),
         _stability(abscissa, where),
         f"The pseudo-gradient is {kind}{where}: m = {monotonicity:.4g}.",
-        OPEN,
+        *found.verdicts,
     )
     return Analysis(
         title=model.title,
         path=source,
-        rows=rows,
-        hypotheses=(),
-        demonstrations=(),
+        rows=(*rows, *found.rows),
+        hypotheses=found.hypotheses,
+        demonstrations=found.demonstrations,
         verdicts=verdicts,
         constants=None,
         exact=None,
         runs={},
+        bounds=found.bounds,
     )
 
 

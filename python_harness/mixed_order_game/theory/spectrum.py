@@ -91,27 +91,42 @@ def _inverse(sums: FloatArray) -> FloatArray:
     return np.where(sums > 0.0, 1.0 / np.where(sums > 0.0, sums, 1.0), 1.0)
 
 
+def owners(game: GameParameters) -> NDArray[np.int_]:
+    """The player of each action of `linear_loop`: N actions where coordinates are alike, else N D."""
+    n = game.players if game.jacobian is None else len(game.jacobian)
+    return np.arange(n) // (n // game.players)
+
+
 def linear_loop(game: GameParameters) -> FloatArray:
-    """M (n, n) in 1/s."""
+    """M (n, n) in 1/s.
+
+    Of costs with expressions that of the loop linearized at x*, from their Jacobian there. Then coordinates
+    may interact: M is of all N D actions, by player, then by coordinate.
+    """
     N = game.players
-    h = gradient_map(game)
-    matrix = np.zeros((2 * N + N * N, 2 * N + N * N))
+    h = gradient_map(game) if game.jacobian is None else game.jacobian
+    of = owners(game)
+    n = len(h)
+    matrix = np.zeros((2 * n + N * n, 2 * n + N * n))
     degree = game.adjacency.sum(axis=1)
     k, k2, k3 = game.regulation, game.of_players("k2"), game.of_players("k3")
-    for i in range(N):
-        x, p, y = i, N + i, 2 * N + i * N
+    for a in range(n):
+        i = int(of[a])
+        x, p, y = a, n + a, 2 * n + i * n
         if game.order[i] == 1:
             matrix[x, [x, p]] = -k[i], k[i]
-            matrix[p, y : y + N] = -k2[i] * h[i]
+            matrix[p, y : y + n] = -k2[i] * h[a]
         else:
             matrix[x, p] = 1.0
             matrix[p, p] = -k[i]
-            matrix[p, y : y + N] = -k2[i] * k[i] * h[i]
-        for j in range(N):
-            shared = N + j if game.order[j] == 1 else j  # xbar_j
-            matrix[y + j, y + j] -= k3[i] * (degree[i] + game.adjacency[i, j])
-            matrix[y + j, 2 * N + np.arange(N) * N + j] += k3[i] * game.adjacency[i]
-            matrix[y + j, shared] += k3[i] * game.adjacency[i, j]
+            matrix[p, y : y + n] = -k2[i] * k[i] * h[a]
+    for i in range(N):
+        for b in range(n):
+            j, y = int(of[b]), 2 * n + i * n + b
+            shared = n + b if game.order[j] == 1 else b  # xbar_j
+            matrix[y, y] -= k3[i] * (degree[i] + game.adjacency[i, j])
+            matrix[y, 2 * n + np.arange(N) * n + b] += k3[i] * game.adjacency[i]
+            matrix[y, shared] += k3[i] * game.adjacency[i, j]
     return matrix
 
 
@@ -136,12 +151,18 @@ def consensus_rate(game: GameParameters) -> float:
 
 
 def initial_deviation(game: GameParameters) -> FloatArray:
-    """s(0) - s* (n, D): s* has x = z = x*, v = 0 and every estimate right."""
+    """s(0) - s* (n, D), or (n, 1) with all coordinates in turn, for the states of `linear_loop`.
+
+    s* has x = z = x*, v = 0 and every estimate right.
+    """
     N, D = game.players, game.dimension
     x_star = nash_equilibrium(game)
     first = game.first_order[:, np.newaxis]
     p = np.where(first, game.z0 - x_star, game.v0)
-    return np.vstack([game.x0 - x_star, p, (game.y0 - x_star).reshape(N * N, D)])
+    y = game.y0 - x_star
+    if game.jacobian is not None:
+        return np.concatenate([(game.x0 - x_star).ravel(), p.ravel(), y.ravel()])[:, np.newaxis]
+    return np.vstack([game.x0 - x_star, p, y.reshape(N * N, D)])
 
 
 def predicted_deviation(game: GameParameters, stop: float, intervals: int) -> tuple[FloatArray, FloatArray]:
