@@ -24,7 +24,7 @@ using Matrix = Eigen::MatrixXd;
 
 constexpr Real infinite = std::numeric_limits<Real>::infinity();
 constexpr int most_cut_actions = 40;  // of games whose boxes are cut
-constexpr int most_parts = 20000;  // times actions
+constexpr int most_parts = 20000;     // times actions
 constexpr int most_corners = 200;
 constexpr int most_points = 200;
 constexpr Real close = 0.005;  // of proof and sample, relative, from where on no more is cut
@@ -155,7 +155,7 @@ Real norm_of(const Matrix& rows) {
 /// Corners and points inside, always the same ones.
 std::vector<std::vector<Real>> samples_of(const Box& box) {
   const bool is_large = box.size() > at(most_cut_actions);
-  std::mt19937_64 random(1);
+  std::mt19937_64 random(1);  // NOLINT(bugprone-random-generator-seed): the same points in every run
   const auto share = [&] { return std::ldexp(static_cast<Real>(random() >> 11U), -53); };
   std::vector<std::vector<Real>> points(1);
   for (const Interval& side : box) points[0].push_back(middle_of(side));

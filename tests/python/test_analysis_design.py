@@ -326,7 +326,7 @@ def test_commands_of_the_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
     root = FIVE_VEHICLES.parents[2]
     page = (root / "python_harness/docs/analyse.md").read_text(encoding="utf-8")
     lines = [line for line in page.splitlines() if line.startswith("mog analyse")]
-    assert len(lines) == 2
+    assert len(lines) == 4
     for line in lines:
         result = CliRunner().invoke(app, line.split()[1:])
         assert result.exit_code == 0, result.output
