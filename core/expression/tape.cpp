@@ -10,7 +10,8 @@ namespace mixed_order_game {
 namespace {
 
 constexpr int lane_multiple = 8;
-constexpr std::size_t most_lanes = 32;  // so that the rows of a tape stay in the nearest caches
+constexpr std::size_t fewest_lanes = 4;  // fewer players are as fast one by one
+constexpr std::size_t most_lanes = 32;   // so that the rows of a tape stay in the nearest caches
 
 /// The nodes that the results need, in the order of a walk that goes to the first operand first: equal for players
 /// whose expressions have the same structure.
@@ -71,10 +72,12 @@ Tapes::Tapes(const std::vector<PlayerResults>& results) {
   std::vector<Tape> tapes;
   for (const std::vector<int>* signature : order) {
     const auto& members = groups[*signature];
-    for (std::size_t first = 0; first < members.size(); first += most_lanes) {
-      const std::size_t count = std::min(most_lanes, members.size() - first);
+    std::size_t count = 0;
+    for (std::size_t first = 0; first < members.size(); first += count) {
+      const std::size_t rest = members.size() - first;
+      count = rest < fewest_lanes ? 1 : std::min(most_lanes, rest);
       Tape tape;
-      tape.lanes = static_cast<int>((count + lane_multiple - 1) / lane_multiple) * lane_multiple;
+      tape.lanes = count == 1 ? 1 : static_cast<int>((count + lane_multiple - 1) / lane_multiple) * lane_multiple;
       for (std::size_t lane = 0; lane < count; ++lane) {
         const PlayerResults& member = *members[first + lane];
         const ExpressionGraph& graph = *member.graph;
@@ -112,6 +115,8 @@ Tapes::Tapes(const std::vector<PlayerResults>& results) {
     }
   }
   for (const Tape& tape : tapes) rows_.emplace_back(tape.start.begin(), tape.start.end());
+  joined_ = std::make_shared<const Joined>(joined(tapes));
+  joined_rows_.assign(joined_->start.begin(), joined_->start.end());
   tapes_ = std::make_shared<const std::vector<Tape>>(std::move(tapes));
 }
 
@@ -154,8 +159,79 @@ void Tapes::run(std::size_t number, const LeafValues& leaves, Real* result) cons
   }
 }
 
+Tapes::Joined Tapes::joined(const std::vector<Tape>& tapes) {
+  Joined all;
+  std::vector<TapeInstruction> code;
+  for (const Tape& tape : tapes) {
+    if (tape.lanes != 1) continue;
+    const auto first = static_cast<int>(all.start.size());
+    all.start.insert(all.start.end(), tape.start.begin(), tape.start.end());
+    for (const auto& [operation, row, a, b] : tape.code) code.push_back({operation, first + row, first + a, first + b});
+    for (const LeafRow& leaf : tape.leaves) {
+      all.leaves.push_back({first + leaf.row, leaf.kind, leaf.index[0], tape.players[0]});
+    }
+    for (const ResultRow& wanted : tape.results) all.results.emplace_back(first + wanted.row, wanted.place[0]);
+  }
+  // of the operations whose operands are known, the one that most instructions wait for comes next
+  std::vector<std::vector<int>> users(all.start.size());  // instructions, by row
+  std::vector<int> missing(code.size(), 0);               // operands
+  std::vector<bool> is_made(all.start.size());
+  for (const TapeInstruction& step : code) is_made[at(step.row)] = true;
+  std::map<Operation, std::vector<int>> ready;
+  for (std::size_t k = 0; k < code.size(); ++k) {
+    for (const int operand : {code[k].a, code[k].b}) {
+      if (!is_made[at(operand)]) continue;
+      users[at(operand)].push_back(static_cast<int>(k));
+      ++missing[k];
+    }
+    if (missing[k] == 0) ready[code[k].operation].push_back(static_cast<int>(k));
+  }
+  while (!ready.empty()) {
+    const auto largest = std::max_element(ready.begin(), ready.end(), [](const auto& one, const auto& other) {
+      return one.second.size() < other.second.size();
+    });
+    const std::vector<int> steps = std::move(largest->second);
+    ready.erase(largest);
+    for (const int k : steps) {
+      all.code.push_back(code[at(k)]);
+      for (const int user : users[at(code[at(k)].row)]) {
+        if (--missing[at(user)] == 0) ready[code[at(user)].operation].push_back(user);
+      }
+    }
+  }
+  return all;
+}
+
+void Tapes::run_joined(const LeafValues& leaves, Real* result) const {
+  Real* rows = joined_rows_.data();
+  for (const auto& [row, kind, index, player] : joined_->leaves) {
+    switch (kind) {
+      case LeafKind::action:
+        rows[row] = leaves.points[player * leaves.stride + index];
+        break;
+      case LeafKind::velocity:
+        rows[row] = leaves.velocities[index];
+        break;
+      case LeafKind::time:
+        rows[row] = leaves.time;
+        break;
+      case LeafKind::parameter:
+        rows[row] = leaves.parameters[index];
+        break;
+      case LeafKind::held:
+        rows[row] = leaves.held[index];
+        break;
+    }
+  }
+  kernels().run_tape(static_cast<int>(joined_->code.size()), joined_->code.data(), 1, 1, rows);
+  for (const auto& [row, place] : joined_->results) result[place] = rows[row];
+}
+
 void Tapes::evaluate(const LeafValues& leaves, Real* result) const {
-  for (std::size_t number = 0; number < rows_.size(); ++number) run(number, leaves, result);
+  for (std::size_t number = 0; number < rows_.size(); ++number) {
+    if ((*tapes_)[number].lanes != 1) run(number, leaves, result);
+  }
+  if (!joined_rows_.empty()) run_joined(leaves, result);
 }
 
 void Tapes::evaluate_player(int player, const LeafValues& leaves, Real* result) const {

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include "aligned_vector.hpp"
@@ -53,7 +54,7 @@ class Tapes {
   };
   struct Tape {
     std::vector<int> players;  ///< by lane
-    int lanes = 0;             ///< with ones at the end that repeat the first: whole vectors
+    int lanes = 0;             ///< 1, or whole vectors with lanes at the end that repeat the first
     int rows = 0;
     std::vector<TapeInstruction> code;
     std::vector<LeafRow> leaves;
@@ -62,8 +63,27 @@ class Tapes {
   };
   void run(std::size_t number, const LeafValues& leaves, Real* result) const;
 
+  /// Tapes of one lane each, one behind the other, with equal operations side by side wherever operands allow it: the
+  /// processor foresees what comes next.
+  struct Joined {
+    struct Leaf {
+      int row;
+      LeafKind kind;
+      int index;
+      int player;
+    };
+    std::vector<TapeInstruction> code;
+    std::vector<Leaf> leaves;
+    std::vector<std::pair<int, int>> results;  ///< row and place
+    std::vector<Real> start;
+  };
+  static Joined joined(const std::vector<Tape>& tapes);
+  void run_joined(const LeafValues& leaves, Real* result) const;
+
   std::shared_ptr<const std::vector<Tape>> tapes_;
+  std::shared_ptr<const Joined> joined_;     // all tapes of one lane
   mutable std::vector<AlignedVector> rows_;  // of each tape
+  mutable AlignedVector joined_rows_;
 };
 
 }  // namespace mixed_order_game

@@ -47,8 +47,13 @@ Real ExpressionCost::value(int i, const Real* x) const {
 }
 
 void ExpressionCost::own_gradients(const Real* points, int stride, Real* gradient, const Real* held) const {
-  QuadraticCost::own_gradients(points, stride, gradient);
   const std::size_t n = at(pattern_.rows());
+  if (has_no_gradients()) {
+    std::fill_n(gradient, n, 0.0);
+    gradients_.values(leaves(points, stride, held), gradient);
+    return;
+  }
+  QuadraticCost::own_gradients(points, stride, gradient);
   scratch_.assign(n, 0.0);
   gradients_.values(leaves(points, stride, held), scratch_.data());
   for (std::size_t p = 0; p < n; ++p) gradient[p] += scratch_[p];

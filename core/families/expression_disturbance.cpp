@@ -1,5 +1,7 @@
 #include "families/expression_disturbance.hpp"
 
+#include <algorithm>
+
 namespace mixed_order_game {
 
 LeafValues ExpressionDisturbance::leaves(Real t, const Real* held) const {
@@ -12,6 +14,11 @@ LeafValues ExpressionDisturbance::leaves(Real t, const Real* held) const {
 }
 
 void ExpressionDisturbance::values(Real t, Real* d, const Real* held) const {
+  if (is_none()) {
+    std::fill_n(d, own_entries(), 0.0);
+    values_.values(leaves(t, held), d);
+    return;
+  }
   SinusoidalDisturbance::values(t, d);
   scratch_.assign(at(own_entries()), 0.0);
   values_.values(leaves(t, held), scratch_.data());

@@ -131,6 +131,11 @@ void QuadraticCost::refresh() {
     }
     neighbours_.start.push_back(neighbours_.entries());
   }
+  const auto vanishes = [&](Number number) {
+    return std::all_of(coefficients[number].begin(), coefficients[number].end(),
+                       [](Real value) { return value == 0.0; });
+  };
+  has_no_gradients_ = neighbours_.entries() == 0 && vanishes(quadratic) && vanishes(linear);
   pattern_ = {};
   hessian_.clear();
   for (int l = 0; l < shape_.dimension; ++l) {

@@ -25,6 +25,8 @@ class QuadraticCost : public Cost {
 
  protected:
   [[nodiscard]] const Shape& shape() const { return shape_; }
+  /// Whether all of its gradients are zero, whatever the actions.
+  [[nodiscard]] bool has_no_gradients() const { return has_no_gradients_; }
 
  private:
   template <typename Scalar>
@@ -37,6 +39,7 @@ class QuadraticCost : public Cost {
   std::vector<Real> neighbour_cost_;  // their c_ij
   SparseRows pattern_;
   std::vector<Real> hessian_;  // constant for this family
+  bool has_no_gradients_ = false;
 };
 
 }  // namespace mixed_order_game

@@ -1,5 +1,7 @@
 #include "families/sinusoidal_disturbance.hpp"
 
+#include <algorithm>
+
 #include "angle_reduction.hpp"
 #include "kernels/kernels.hpp"
 
@@ -55,6 +57,10 @@ void SinusoidalDisturbance::refresh() {
   frequency_ = own(frequency);
   bias_ = own(bias);
   phase_at_origin_ = own(phase);
+  const auto vanishes = [](const std::vector<Real>& values) {
+    return std::all_of(values.begin(), values.end(), [](Real value) { return value == 0.0; });
+  };
+  is_none_ = vanishes(amplitude_) && vanishes(bias_);
   if (time_origin == 0.0) return;
   for (std::size_t p = 0; p < phase_at_origin_.size(); ++p) {
     phase_at_origin_[p] = reduced_angle(frequency_[p], time_origin, phase_at_origin_[p]);

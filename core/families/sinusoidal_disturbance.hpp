@@ -19,6 +19,8 @@ class SinusoidalDisturbance : public Disturbance {
 
  protected:
   [[nodiscard]] int own_entries() const { return shape_.own_entries(); }
+  /// Whether it is zero at all times.
+  [[nodiscard]] bool is_none() const { return is_none_; }
 
  private:
   template <typename Scalar>
@@ -29,6 +31,7 @@ class SinusoidalDisturbance : public Disturbance {
   Shape shape_;
   // at own entries, as the coefficients
   std::vector<Real> amplitude_, frequency_, bias_;
+  bool is_none_ = false;
   std::vector<Real> phase_at_origin_;  ///< frequency time_origin + phase; a large origin does not cost it digits
 };
 

@@ -77,8 +77,8 @@ struct Kernels {
                        const double* activation, const double* weights, double* rate);
   double (*dot)(int n, const double* a, const double* b);
 
-  /// Runs the code of a tape over rows of lanes, a multiple of 8; row k begins at rows + k * lanes. Lanes after those
-  /// that are used repeat the first.
+  /// Runs the code of a tape over rows of lanes, 1 or a multiple of 8; row k begins at rows + k * lanes. Lanes after
+  /// those that are used repeat the first.
   void (*run_tape)(int count, const TapeInstruction* code, int lanes, int used, double* rows);
 
   // Newton solver

@@ -14,13 +14,27 @@ inline void for_each_lane(int lanes, const double* a, const double* b, double* o
   }
 }
 
-void run_tape(int count, const TapeInstruction* code, int lanes, int used, double* rows) {
+template <bool is_alone>
+inline void run_lanes(int count, const TapeInstruction* code, int some_lanes, int used, double* rows) {
+  const int lanes = is_alone ? 1 : some_lanes;
   for (const TapeInstruction* step = code; step != code + count; ++step) {
     const double* a = rows + static_cast<Index>(step->a) * lanes;
     const double* b = rows + static_cast<Index>(step->b) * lanes;
     double* out = rows + static_cast<Index>(step->row) * lanes;
-    const auto each = [=](auto function) { for_each_lane(lanes, a, b, out, function); };
+    const auto each = [&](auto function) {
+      if constexpr (is_alone) {
+        for (;; ++step) {  // and of all that follow with the same operation
+          rows[step->row] = function(rows[step->a], rows[step->b]);
+          if (step + 1 == code + count || step[1].operation != step->operation) return;
+        }
+      }
+      for_each_lane(lanes, a, b, out, function);
+    };
     const auto each_used = [=](auto function) {
+      if constexpr (is_alone) {
+        *out = function(*a, *b);
+        return;
+      }
       for (int k = 0; k < used; ++k) out[k] = function(a[k], b[k]);
       for (int k = used; k < lanes; ++k) out[k] = out[0];
     };
@@ -146,5 +160,13 @@ void run_tape(int count, const TapeInstruction* code, int lanes, int used, doubl
         each_used(noise);
         break;
     }
+  }
+}
+
+void run_tape(int count, const TapeInstruction* code, int lanes, int used, double* rows) {
+  if (lanes == 1) {
+    run_lanes<true>(count, code, lanes, used, rows);
+  } else {
+    run_lanes<false>(count, code, lanes, used, rows);
   }
 }
