@@ -26,6 +26,12 @@ import psutil
 from tests.oracle.game import FloatArray, read_game
 
 from . import report
+from .expression_games import (
+    aggregative,
+    five_vehicles,
+    scaling_by_defaults,
+    scaling_in_one_coordinate,
+)
 from .peers.core import Core
 from .peers.hybrid_model import Solution
 from .scaling_game import scaling_game
@@ -349,10 +355,75 @@ def microbench(context: Context) -> Result:
     }
 
 
+def expressions(context: Context) -> Result:
+    """Games written as expressions against the same games, or ones as large, of coefficients, in pairs."""
+    rounds = 3 if context.quick else 11
+
+    def core(name: str, text: str, stop: float, outputs: int) -> Core:
+        file = context.scratch / f"{name}.toml"
+        file.write_text(text, encoding="utf-8")
+        return Core(PROGRAMS / "core_run", file, stop, outputs)
+
+    def paired_runs(ours: Core, theirs: Core, repetitions: int) -> Result:
+        pairs = []
+        for _ in range(rounds):
+            other = theirs.run(1e-6, repetitions=repetitions)
+            own = ours.run(1e-6, repetitions=repetitions)
+            pairs.append((own.median, other.median))
+        return {
+            "expressions": float(np.median([own for own, _ in pairs])),
+            "coefficients": float(np.median([other for _, other in pairs])),
+            "ratio": float(np.median([own / other for own, other in pairs])),
+            "peak_mb": [own.peak_mb, other.peak_mb],
+        }
+
+    scaling = core("scaling_expressions", scaling_by_defaults(100), 2.0, 20)
+    five = core("five_expressions", five_vehicles(), 20.0, 200)
+    exact = [each.run(1e-10).trajectory for each in (five, context.core)]
+    result: Result = {
+        "five vehicles": paired_runs(five, context.core, 5)
+        | {"difference": float(np.max(np.abs(exact[0] - exact[1])))},
+        "scaling family, N = 100": paired_runs(
+            scaling,
+            core("scaling_coefficients", scaling_game(100), 2.0, 20),
+            1,
+        ),
+    }
+    result["aggregative, N = 200"] = _rates(context)
+    readings = [scaling.run(1e-3) for _ in range(rounds)]
+    result["reading"] = {
+        "cpu": float(np.median([run.reading for run in readings])),
+        "peak_mb": float(np.median([run.peak_mb for run in readings])),
+    }
+    return result
+
+
+def _rates(context: Context) -> Result:
+    """Right-hand sides of the aggregative game and the quadratic one with as many states, in turn."""
+    words = [str(PROGRAMS / "microbench"), "--benchmark_format=json", "--benchmark_filter=^rate/"]
+    words += ["--benchmark_repetitions=9", "--benchmark_enable_random_interleaving=true"]
+    words += [f"--benchmark_min_time={0.02 if context.quick else 0.1}"]
+    for name, text in (
+        ("expressions", aggregative(200)),
+        ("coefficients", scaling_in_one_coordinate(200)),
+    ):
+        file = context.scratch / f"rate_{name}.toml"
+        file.write_text(text, encoding="utf-8")
+        words.append(f"{name}={file}")
+    done = subprocess.run(words, check=True, capture_output=True, text=True)
+    seconds = {
+        row["run_name"].removeprefix("rate/"): row["cpu_time"] * 1e-9
+        for row in json.loads(done.stdout)["benchmarks"]
+        if row.get("aggregate_name") == "median"
+    }
+    return seconds | {"ratio": seconds["expressions"] / seconds["coefficients"]}
+
+
 PARTS: dict[str, Callable[[Context], Result]] = {
     "paired": paired,
     "precision": precision,
     "scaling": scaling,
+    "expressions": expressions,
     "overhead": overhead,
     "microbench": microbench,
 }

@@ -62,9 +62,11 @@ int run(int count, char** arguments) {
   std::ifstream file(arguments[1]);
   if (!file) throw std::runtime_error(std::string("cannot read ") + arguments[1]);
   const std::string text{std::istreambuf_iterator<char>(file), {}};
+  const double start = cpu_seconds();
   const ClosedLoop loop(parse_game(text).parameters);
   const Inputs input(loop.shape().actions());
   Integrator integrator(loop, input, make_solver(options["--solver"]));
+  const double reading = cpu_seconds() - start;
 
   const auto kept = at(2 * loop.shape().actions());  // x and z or v
   std::vector<double> trajectory(kept * at(outputs + 1));
@@ -89,10 +91,12 @@ int run(int count, char** arguments) {
   const Statistics statistics = integrator.statistics();
   std::printf(
       "{\"states\": %d, \"level\": \"%s\", \"steps\": %lld, \"rate_evaluations\": %lld, \"setups\": %lld, "
-      "\"solves\": %lld, \"events\": %lld, \"peak_mb\": %.2f, \"cpu\": [",
+      "\"solves\": %lld, \"events\": %lld, \"peak_mb\": %.2f, "
+      "\"reading\": %.9g, \"cpu\": [",
       loop.layout().size(), kernels().level, static_cast<long long>(statistics.steps),
       static_cast<long long>(statistics.rate_evaluations), static_cast<long long>(statistics.newton_setups),
-      static_cast<long long>(statistics.newton_solves), static_cast<long long>(statistics.events), peak_megabytes());
+      static_cast<long long>(statistics.newton_solves), static_cast<long long>(statistics.events), peak_megabytes(),
+      reading);
   for (std::size_t k = 0; k < seconds.size(); ++k) std::printf("%s%.9g", k == 0 ? "" : ", ", seconds[k]);
   std::puts("]}");
   return 0;

@@ -42,7 +42,8 @@ def five_vehicles() -> str:
     )
     tables = (
         f"[parameters]\nC = {{ value = {coupling}, fixed = true }}\n\n"
-        f'[defaults]\ncost = {{ expression = "{FIVE_COST}" }}\ndisturbance = {{ expression = "i * sin(i * t)" }}\n'
+        f'[defaults]\ncost = {{ expression = "{FIVE_COST}" }}\n'
+        'disturbance = { expression = "i * sin(i * t)" }\n'
     )
     return text.replace("[[player]]", tables + "\n[[player]]", 1)
 
@@ -59,8 +60,17 @@ def scaling_by_defaults(players: int) -> str:
     return text.replace("[[player]]", tables + "\n[[player]]", 1)
 
 
+def scaling_in_one_coordinate(players: int) -> str:
+    """The scaling family with D = 1."""
+    text = scaling_game(players).replace("dimension = 2", "dimension = 1")
+    text = re.sub(r"^x0 = \[([^,]*),.*\]", r"x0 = \1", text, flags=re.MULTILINE)
+    text = re.sub(r"linear = \[([^,\[]*),[^\]]*\]", r"linear = \1", text)
+    text = text.replace("phase = [1.0, 2.0]", "phase = 1.0")
+    return re.sub(r"^width = .*$", f"width = {(5.0 * players) ** 0.5!r}", text, flags=re.MULTILINE)
+
+
 def aggregative(players: int) -> str:
-    """Costs that depend on the sum of all actions: that of the scaling family with D = 1 beside it."""
+    """Costs that depend on the mean of all actions, with as many states as the family in one coordinate."""
     text = scaling_by_defaults(players).replace("dimension = 2", "dimension = 1")
     text = re.sub(r"^x0 = \[([^,]*),.*\]", r"x0 = \1", text, flags=re.MULTILINE)
     cost = "(1 + mod(i - 1, 5)) * x[i]^2 + x[i] * tanh(sum(x[j] for j in 1..N) / N)"
@@ -71,12 +81,12 @@ def aggregative(players: int) -> str:
 def main() -> None:
     """Write one of the games to standard output."""
     players = int(sys.argv[2]) if len(sys.argv) > 2 else 100
-    makers = {
-        "five": five_vehicles,
-        "scaling": lambda: scaling_by_defaults(players),
-        "aggregative": lambda: aggregative(players),
+    text = {
+        "five": five_vehicles(),
+        "scaling": scaling_by_defaults(players),
+        "aggregative": aggregative(players),
     }
-    sys.stdout.write(makers[sys.argv[1]]())
+    sys.stdout.write(text[sys.argv[1]])
 
 
 if __name__ == "__main__":

@@ -83,19 +83,43 @@ def reference(gradient_of: Gradient, times: np.ndarray) -> np.ndarray:
     return solve_ivp(rate, (0.0, times[-1]), start, "LSODA", times, rtol=1e-10, atol=1e-11).y[:6].T
 
 
-@pytest.mark.parametrize("name", COSTS)
-def test_the_error_stays_with_the_tolerance(name: str, tmp_path: Path) -> None:
+def errors(name: str, folder: Path) -> dict[float, tuple[float, float]]:
+    """By tolerance: the largest error of actions, and of references and velocities, over 3 s."""
     text, gradient = COSTS[name]
-    (tmp_path / "game.toml").write_text(GAME % text, encoding="utf-8")
-    fmu = build_fmu(tmp_path / "game.toml", tmp_path / "game.fmu")
+    (folder / f"{name}.toml").write_text(GAME % text, encoding="utf-8")
+    fmu = build_fmu(folder / f"{name}.toml", folder / f"{name}.fmu")
     times = np.linspace(0.0, 3.0, 301)
     expected = reference(gradient, times)
+    found = {}
     for tolerance in (1e-4, 1e-6, 1e-8):
         result = mog.run(
             fmu, stop_time=3.0, step=0.01, tolerance=tolerance, outputs=["x", "v", "z", "solver_steps"]
         )
-        found = np.concatenate(
-            [result.x[:, :, 0], np.where(SECOND, result.v[:, :, 0], result.z[:, :, 0])], axis=1
+        x, other = result.x[:, :, 0], np.where(SECOND, result.v[:, :, 0], result.z[:, :, 0])
+        found[tolerance] = (
+            float(np.abs(x - expected[:, :3]).max()),
+            float(np.abs(other - expected[:, 3:]).max()),
         )
-        error = np.abs(found - expected).max()
-        assert error < 600.0 * tolerance
+    return found
+
+
+@pytest.fixture(scope="module")
+def of_quadratic(tmp_path_factory: pytest.TempPathFactory) -> dict[float, tuple[float, float]]:
+    return errors("quadratic", tmp_path_factory.mktemp("quadratic"))
+
+
+@pytest.mark.parametrize("name", [name for name in COSTS if name != "quadratic"])
+def test_the_error_stays_with_the_tolerance(
+    name: str, of_quadratic: dict[float, tuple[float, float]], tmp_path: Path
+) -> None:
+    """Actions err by a few tolerances.
+
+    Velocities err more with any cost, by up to 100 tolerances at 1e-8: the robust term pushes them with the
+    slope k4 + K delta^2 / epsilon = 31 1/s at every crossing of its layer, and as CVODE bounds the error of a
+    step, that of the run falls with a power of the tolerance below 1. What curvature adds is told by the same
+    loop with quadratic costs: it was measured as a factor of 2.8 at most.
+    """
+    for tolerance, (actions, others) in errors(name, tmp_path).items():
+        assert actions < 10.0 * tolerance
+        assert others < 4.0 * of_quadratic[tolerance][1]
+        assert of_quadratic[tolerance][1] < 150.0 * tolerance

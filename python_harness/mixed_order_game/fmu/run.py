@@ -423,18 +423,21 @@ class Simulator:
         return np.asarray(block.values[0], dtype=np.float64)
 
     @in_turn
-    def jacobian(self, states: Sequence[str], values: Mapping[str, Value]) -> NDArray[np.float64]:
-        """Derivatives (n, n) in 1/s of the rates of some states along them, after such an initialization.
+    def jacobian(
+        self, states: Sequence[str], values: Mapping[str, Value], along: Sequence[str] | None = None
+    ) -> NDArray[np.float64]:
+        """Derivatives (n, m) in 1/s of the rates of some states along others, after such an initialization.
 
-        Entry [a, b] is the derivative of der(states[a]) along states[b].
+        Entry [a, b] is the derivative of der(states[a]) along along[b], by default states[b].
         """
+        along = states if along is None else along
         rates = [self.model.variable(f"der({name})").reference for name in states]
         columns = []
         with self._initialized(values) as slave:
-            for name in states:
+            for name in along:
                 reference = self.model.variable(name).reference
                 columns.append(slave.getDirectionalDerivative(rates, [reference], [1.0]))
-        return np.array(columns, dtype=np.float64).reshape(len(states), len(states)).T
+        return np.array(columns, dtype=np.float64).reshape(len(along), len(states)).T
 
     @contextmanager
     def _initialized(self, values: Mapping[str, Value]) -> Iterator[Any]:

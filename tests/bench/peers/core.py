@@ -25,6 +25,7 @@ class CoreRun:
     solves: int
     events: int
     peak_mb: float
+    reading: float  # the game, until it can run
     cpu: list[float]
     trajectory: FloatArray  # (T, 2 N D): x, then z or v, coordinate-major
 
@@ -43,7 +44,7 @@ class Core:
     stop: float
     outputs: int
 
-    def run(self, rtol: float, *, repetitions: int = 1, solver: str = "auto") -> CoreRun:
+    def run(self, rtol: float, *, repetitions: int = 1, solver: str = "structured") -> CoreRun:
         """Runs the game in a process of its own; the absolute tolerance is 0.01 rtol."""
         with tempfile.TemporaryDirectory() as folder:
             file = Path(folder) / "trajectory"
