@@ -158,6 +158,15 @@ void ClosedLoop::evaluate_seeking(const Real* state, const Real* inputs, const M
   }
 }
 
+void ClosedLoop::evaluate_control(Signals& signals) const {
+  const Real* k = gains_.k.data();
+  const Real* e = signals.error.data();
+  const Real* s = signals.network.data();
+  const Real* phi = signals.robust.data();
+  Real* u = signals.control.data();
+  for (std::size_t p = 0; p < own_.size(); ++p) u[p] = terms::control(k[p], e[p], s[p], phi[p]);
+}
+
 void ClosedLoop::evaluate(Real t, const Real* state, const Real* inputs, const Modes& modes, Signals& signals,
                           Real* rate) const {
   const Kernels& kernel = kernels();
@@ -166,12 +175,13 @@ void ClosedLoop::evaluate(Real t, const Real* state, const Real* inputs, const M
   const Real* d_ext = inputs + inputs_.d_ext();
   const Real* e = signals.error.data();
   const Real* s = signals.network.data();
-  const Real* phi = signals.robust.data();
+  const Real* u = signals.control.data();
   const Real* gradient = signals.gradient.data();
   Real* g = signals.dynamics.data();
   Real* d = signals.disturbance.data();
 
   evaluate_seeking(state, inputs, modes, signals);
+  evaluate_control(signals);
   if (strategy.robust) {
     for (int p = 0; p < n; ++p)
       signals.radial[at(p)] = modes[at(p)] != 0 && e[p] * s[p] >= 0.0 ? s[p] / gains_.W_max[at(p)] : 0.0;
@@ -190,14 +200,10 @@ void ClosedLoop::evaluate(Real t, const Real* state, const Real* inputs, const M
     std::copy_n(d_ext, n, d);
   }
 
-  const Real* k = gains_.k.data();
   const Real* k2 = gains_.k2.data();
-  Real* control = signals.control.data();
   for (std::size_t p = 0; p < own_.size(); ++p) {
     const auto& [entry, to_x, to_reference, second] = own_[p];
-    const Real u = terms::control(k[p], e[p], s[p], phi[p]);
-    const Real driven = u + g[p] + d[p];
-    control[p] = u;
+    const Real driven = u[p] + g[p] + d[p];
     if (to_x >= 0) rate[to_x] = second ? reference[entry] : driven;  // x' = v or x' = u + g + d
     if (to_reference >= 0) rate[to_reference] = second ? driven : terms::reference_rate(k2[p], gradient[p]);
   }

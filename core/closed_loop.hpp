@@ -90,6 +90,9 @@ class ClosedLoop {
   /// activations, network and robust term.
   void evaluate_seeking(const Real* state, const Real* inputs, const Modes& modes, Signals& signals) const;
 
+  /// u of the signals' errors, network and robust term.
+  void evaluate_control(Signals& signals) const;
+
   /// All signals and state rates at time_origin() + t [s]; the inputs lie as inputs() says.
   void evaluate(Real t, const Real* state, const Real* inputs, const Modes& modes, Signals& signals, Real* rate) const;
 

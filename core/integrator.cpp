@@ -46,11 +46,15 @@ class Integrator::Implementation final : NewtonSystem, RosenbrockSystem {
  public:
   Implementation(const ClosedLoop& loop, const Inputs& inputs, std::unique_ptr<NewtonSolver> newton);
 
-  void start(Real t, Tolerances tolerances);
+  void start(Real t, Tolerances tolerances, const JudgingRule& rule);
+  void set_equilibrium(std::span<const Real> x_star) { judge_.set_equilibrium(x_star); }
+  void prepare_change();
   void restart(bool parameters_changed);
   void advance(Real t_end);
   bool restore(const Checkpoint& checkpoint, Tolerances tolerances);
-  [[nodiscard]] Checkpoint checkpoint() const;
+  [[nodiscard]] Checkpoint checkpoint();
+  [[nodiscard]] Judgement judgement();
+  void begin_errors_anew(Real from);
   [[nodiscard]] Statistics statistics() const;
 
   [[nodiscard]] Real time() const { return time_; }
@@ -98,6 +102,8 @@ class Integrator::Implementation final : NewtonSystem, RosenbrockSystem {
   LoopJacobian jacobian_;
   RobustLayer layer_;
   LocatedConditions conditions_;
+  Judge judge_;
+  Judge::Path path_;  // through CVODE's last step
   int size_;
   std::int64_t most_steps_between_restarts_;
   Tolerances tolerances_;
@@ -107,6 +113,7 @@ class Integrator::Implementation final : NewtonSystem, RosenbrockSystem {
   AlignedVector restart_state_;
   Modes restart_modes_;
   Statistics restart_statistics_;
+  Judgement restart_judgement_;
   std::int64_t steps_since_restart_ = 0;
 
   // after a change of inputs or parameters
@@ -130,11 +137,14 @@ class Integrator::Implementation final : NewtonSystem, RosenbrockSystem {
   // scratch
   Signals signals_;
   AlignedVector input_values_;  // where they were needed last
+  AlignedVector judged_inputs_;
+  AlignedVector judged_state_;
   AlignedVector norm2_;
   AlignedVector rate_;
   AlignedVector event_values_;
   AlignedVector weight_;
   AlignedVector next_state_;
+  AlignedVector next_rate_;
   std::int64_t events_ = 0;
   std::int64_t newton_setups_ = 0;
   std::int64_t newton_solves_ = 0;
@@ -157,6 +167,12 @@ Integrator::Implementation::Implementation(const ClosedLoop& loop, const Inputs&
       jacobian_(loop),
       layer_(loop),
       conditions_(loop),
+      judge_(loop),
+      path_([this](Real t) {
+        interpolate(t, judged_state_.data());
+        inputs_.values(t, judged_inputs_.data());
+        return Judge::Place{judged_state_.data(), judged_inputs_.data()};
+      }),
       size_(loop.layout().size()),
       most_steps_between_restarts_(most_steps_between_restarts(size_)),
       restart_state_(at(size_)),
@@ -166,11 +182,14 @@ Integrator::Implementation::Implementation(const ClosedLoop& loop, const Inputs&
       modes_(restart_modes_.size()),
       signals_(loop.shape()),
       input_values_(at(loop.inputs().size())),
+      judged_inputs_(input_values_.size()),
+      judged_state_(at(size_)),
       norm2_(at(loop.shape().own_entries())),
       rate_(at(size_)),
       event_values_(passed_.size()),
       weight_(at(size_)),
       next_state_(at(size_)),
+      next_rate_(at(size_)),
       context_(make_context()),
       vector_(make_vector(size_, context_.get())),
       matrix_(make_placeholder_matrix(context_.get())),
@@ -355,6 +374,8 @@ void Integrator::Implementation::begin_at_restart_point() {
   const int flag = CVodeReInit(cvode_.get(), restart_time_, vector_.get());
   if (flag < 0) fail(flag, restart_time_);
   plan_event(restart_time_);
+  judge_.jump(restart_time_, {restart_state_.data(), inputs_at(restart_time_)}, modes_);
+  restart_judgement_ = judge_.judgement();
 }
 
 /// Has CVODE stop where the next event after time t is known to be.
@@ -377,7 +398,7 @@ void Integrator::Implementation::settle(Real t, Real* state) {
   loop_.project(modes_, inputs_at(t), signals_, state);
 }
 
-void Integrator::Implementation::start(Real t, Tolerances tolerances) {
+void Integrator::Implementation::start(Real t, Tolerances tolerances, const JudgingRule& rule) {
   tolerances_ = tolerances;
   restart_statistics_ = {};
   largest_raw_excess_ = 0.0;
@@ -395,7 +416,22 @@ void Integrator::Implementation::start(Real t, Tolerances tolerances) {
   loop_.resolve_modes(state_.data(), inputs_at(t), tolerances_.relative, signals_, modes_);
   restart_state_ = state_;
   restart_modes_ = modes_;
+  judge_.start(t, rule, {state_.data(), inputs_at(t)}, modes_);
   begin_at_restart_point();
+}
+
+void Integrator::Implementation::prepare_change() {
+  if (judge_.judgement().until < time_) judge_.pass(time_, path_, modes_);
+}
+
+Judgement Integrator::Implementation::judgement() {
+  return judge_.judgement().until < time_ ? judge_.up_to(time_, path_, modes_) : judge_.judgement();
+}
+
+void Integrator::Implementation::begin_errors_anew(Real from) {
+  judge_.begin_errors_anew(time_, from, {state_.data(), inputs_at(time_)});
+  restart_judgement_.errors_from = judge_.judgement().errors_from;
+  restart_judgement_.error_peak = judge_.judgement().error_peak;
 }
 
 void Integrator::Implementation::restart(bool parameters_changed) {
@@ -423,6 +459,7 @@ void Integrator::Implementation::follow_change(Real t_end) {
   Real h = first_step_ > 0.0 ? first_step_ : 0.1 * (t_end - t);
   Statistics work;
   constexpr Real epsilon = std::numeric_limits<Real>::epsilon();
+  bool knows_rate = false;  // at t
   for (int tried = 0; t < t_end && tried < most_rosenbrock_steps; ++tried) {
     const Real left = t_end - t;
     const bool arrives = h >= 0.999 * left;
@@ -446,9 +483,21 @@ void Integrator::Implementation::follow_change(Real t_end) {
     const Real next = arrives ? t_end : t + step;
     if (event_functions(next, next_state_.data(), event_values_.data()) != 0) break;
     if (std::any_of(event_values_.begin(), event_values_.end(), [](Real value) { return value > 0.0; })) break;
+    if (!knows_rate && rate(t, restart_state_.data(), rate_.data()) != 0) break;
+    if (finite_rate(next, next_state_.data(), next_rate_.data()) != 0) break;
     if (work.steps == 0) first_step_ = std::min(h, 2.0 * step);
     ++work.steps;
+    judge_.pass(
+        next,
+        [&](Real time) {
+          hermite_cubic({t, restart_state_, rate_}, {next, next_state_, next_rate_}, time, judged_state_);
+          inputs_.values(time, judged_inputs_.data());
+          return Judge::Place{judged_state_.data(), judged_inputs_.data()};
+        },
+        modes_);
     restart_state_.swap(next_state_);
+    rate_.swap(next_rate_);
+    knows_rate = true;
     t = next;
   }
   settle(t, restart_state_.data());
@@ -460,6 +509,7 @@ void Integrator::Implementation::follow_change(Real t_end) {
 }
 
 void Integrator::Implementation::take_step() {
+  if (judge_.has_noted()) judge_.pass_noted(path_, modes_);
   const Real before = internal_time_;
   // CVODE derives its first step from the distance to the output time, so that must not depend on the caller
   const Real horizon = restart_time_ + std::max(1.0, 1e-3 * std::fabs(restart_time_));
@@ -496,6 +546,10 @@ void Integrator::Implementation::take_step() {
     event_pending_ = true;
     event_time_ = internal_time_;
   }
+  if (!event_pending_) {
+    inputs_.values(internal_time_, judged_inputs_.data());
+    judge_.note(internal_time_, {N_VGetArrayPointer(vector_.get()), judged_inputs_.data()}, modes_, signals_);
+  }
 }
 
 /// Handles the pending event; true when that was a restart. A column that enters the sphere needs one, because its
@@ -504,6 +558,7 @@ void Integrator::Implementation::take_step() {
 bool Integrator::Implementation::handle_event() {
   event_pending_ = false;
   const Real t = event_time_;
+  judge_.pass(t, path_, modes_);
   Real* state = N_VGetArrayPointer(vector_.get());
   interpolate(t, state);
   settle(t, state);
@@ -586,9 +641,19 @@ Statistics Integrator::Implementation::statistics() const {
   return statistics;
 }
 
-Checkpoint Integrator::Implementation::checkpoint() const {
-  return {restart_time_, restart_state_, restart_modes_, restart_statistics_, steps_since_restart_, first_step_,
-          time_,         state_,         modes_,         statistics()};
+Checkpoint Integrator::Implementation::checkpoint() {
+  return {restart_time_,
+          restart_state_,
+          restart_modes_,
+          restart_statistics_,
+          restart_judgement_,
+          steps_since_restart_,
+          first_step_,
+          time_,
+          state_,
+          modes_,
+          statistics(),
+          judgement()};
 }
 
 bool Integrator::Implementation::restore(const Checkpoint& checkpoint, Tolerances tolerances) {
@@ -603,6 +668,7 @@ bool Integrator::Implementation::restore(const Checkpoint& checkpoint, Tolerance
   restart_statistics_ = checkpoint.restart_statistics;
   first_step_ = checkpoint.first_step;
   follows_change_ = false;
+  judge_.resume(checkpoint.restart_judgement);
   jacobian_.refresh();
   newton_->refresh(jacobian_);
   begin_at_restart_point();
@@ -630,6 +696,7 @@ bool Integrator::Implementation::restore(const Checkpoint& checkpoint, Tolerance
   restart_state_ = state_ = checkpoint.state;
   restart_modes_ = checkpoint.modes;
   restart_statistics_ = checkpoint.statistics;
+  judge_.resume(checkpoint.judgement);
   begin_at_restart_point();
   return false;
 }
@@ -643,7 +710,11 @@ std::int64_t Integrator::most_steps_between_restarts(int states) {
   return std::max<std::int64_t>(500, 20'000'000 / states);
 }
 
-void Integrator::start(Real t, Tolerances tolerances) { implementation_->start(t, tolerances); }
+void Integrator::start(Real t, Tolerances tolerances, const JudgingRule& rule) {
+  implementation_->start(t, tolerances, rule);
+}
+void Integrator::set_equilibrium(std::span<const Real> x_star) { implementation_->set_equilibrium(x_star); }
+void Integrator::prepare_change() { implementation_->prepare_change(); }
 void Integrator::restart(bool parameters_changed) { implementation_->restart(parameters_changed); }
 void Integrator::advance(Real t_end) { implementation_->advance(t_end); }
 Real Integrator::time() const { return implementation_->time(); }
@@ -651,7 +722,9 @@ const Real* Integrator::state() const { return implementation_->state(); }
 const Modes& Integrator::modes() const { return implementation_->modes(); }
 Statistics Integrator::statistics() const { return implementation_->statistics(); }
 Real Integrator::largest_raw_excess() const { return implementation_->largest_raw_excess(); }
-Checkpoint Integrator::checkpoint() const { return implementation_->checkpoint(); }
+Judgement Integrator::judgement() { return implementation_->judgement(); }
+void Integrator::begin_errors_anew(Real from) { implementation_->begin_errors_anew(from); }
+Checkpoint Integrator::checkpoint() { return implementation_->checkpoint(); }
 bool Integrator::restore(const Checkpoint& checkpoint, Tolerances tolerances) {
   return implementation_->restore(checkpoint, tolerances);
 }

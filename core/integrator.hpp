@@ -16,8 +16,10 @@
 
 #include <cstdint>
 #include <memory>
+#include <span>
 
 #include "closed_loop.hpp"
+#include "judge.hpp"
 #include "loop/inputs.hpp"
 #include "newton_solver.hpp"
 
@@ -45,12 +47,14 @@ struct Checkpoint {
   AlignedVector restart_state;
   Modes restart_modes;
   Statistics restart_statistics;
+  Judgement restart_judgement;
   std::int64_t steps_since_restart = 0;
   Real first_step = 0.0;  ///< to try after the next change [s]; 0 when nothing is known of it
   Real time = 0.0;        ///< communication point at which it was taken
   AlignedVector state;
   Modes modes;
   Statistics statistics;
+  Judgement judgement;
 };
 
 class Integrator {
@@ -62,8 +66,13 @@ class Integrator {
   Integrator& operator=(const Integrator&) = delete;
 
   /// Begins a run at time t with the loop's initial state.
-  void start(Real t, Tolerances tolerances);
+  void start(Real t, Tolerances tolerances, const JudgingRule& rule = {});
 
+  /// x* for the judgement, at entry(i, l), from the next start() or restart() on; empty where it is not known.
+  void set_equilibrium(std::span<const Real> x_star);
+
+  /// Parameters or inputs are about to change: judges the run up to the present time by those that act now.
+  void prepare_change();
   /// Restarts at the present time because parameters, or only inputs, changed. When the last restart was a few steps
   /// ago, the next call of advance() takes Rosenbrock steps.
   void restart(bool parameters_changed = true);
@@ -77,12 +86,16 @@ class Integrator {
   [[nodiscard]] const Real* state() const;
   [[nodiscard]] const Modes& modes() const;
   [[nodiscard]] Statistics statistics() const;
+  /// Of the run up to time(), which leaves no trace in it.
+  [[nodiscard]] Judgement judgement();
+  /// The peak of errors begins anew at the later of time() and from.
+  void begin_errors_anew(Real from);
   /// Largest excess of w'w over W_max that projection removed since the start, relative to W_max.
   [[nodiscard]] Real largest_raw_excess() const;
 
   /// What bounds the steps that a restore has to repeat.
   [[nodiscard]] static std::int64_t most_steps_between_restarts(int states);
-  [[nodiscard]] Checkpoint checkpoint() const;
+  [[nodiscard]] Checkpoint checkpoint();
   /// Returns to a checkpoint by restarting at its restart point and repeating its steps. True when that led to the
   /// checkpoint's own state, bit for bit; otherwise (another machine's arithmetic) the run goes on from that state with
   /// a restart, and false is returned. Throws Error when the checkpoint asks for more steps than a run can have taken.

@@ -21,8 +21,10 @@ bool same_bits(std::span<const Real> a, std::span<const Real> b) {
 CoSimulation::CoSimulation(const Evaluation& evaluation)
     : loop_(evaluation.loop()), integrator_(loop_, evaluation.inputs(), make_structured_newton()) {}
 
-void CoSimulation::start(Tolerances tolerances, std::vector<Real> acting) {
-  integrator_.start(0.0, tolerances);
+void CoSimulation::start(Tolerances tolerances, std::vector<Real> acting, const JudgingRule& rule,
+                         std::span<const Real> x_star) {
+  integrator_.set_equilibrium(x_star);
+  integrator_.start(0.0, tolerances, rule);
   time_ = loop_.time_origin();
   acting_ = std::move(acting);
 }
@@ -31,13 +33,14 @@ Standing CoSimulation::standing() const {
   return {time_, integrator_.time(), integrator_.state(), &integrator_.modes()};
 }
 
-Change CoSimulation::change_to(std::span<const Real> settings, std::size_t parameters) const {
-  if (same_bits(settings, acting_)) return Change::none;
-  return same_bits(settings.first(parameters), std::span(acting_).first(parameters)) ? Change::input
-                                                                                     : Change::parameters;
+Change CoSimulation::change_to(std::span<const Real> settings, std::size_t parameters, std::size_t inputs) const {
+  const std::span<const Real> acting = acting_;
+  if (!same_bits(settings.first(parameters), acting.first(parameters))) return Change::parameters;
+  return same_bits(settings.last(inputs), acting.last(inputs)) ? Change::none : Change::input;
 }
 
-void CoSimulation::settings_act(Change change, std::vector<Real> acting) {
+void CoSimulation::settings_act(Change change, std::vector<Real> acting, std::span<const Real> x_star) {
+  if (change == Change::parameters) integrator_.set_equilibrium(x_star);
   acting_ = std::move(acting);
   integrator_.restart(change == Change::parameters);
 }

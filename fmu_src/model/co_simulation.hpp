@@ -22,21 +22,27 @@ class CoSimulation {
   /// The evaluation must outlive the run.
   explicit CoSimulation(const Evaluation& evaluation);
 
-  /// Begins at the loop's time origin with its initial state.
-  void start(Tolerances tolerances, std::vector<Real> acting);
+  /// Begins at the loop's time origin with its initial state; x_star is empty where it is not known.
+  void start(Tolerances tolerances, std::vector<Real> acting, const JudgingRule& rule, std::span<const Real> x_star);
   [[nodiscard]] Standing standing() const;
   [[nodiscard]] Statistics statistics() const { return integrator_.statistics(); }
 
-  /// What differs, bit for bit, from the settings that act; the numbers of parameters come before those of inputs.
-  [[nodiscard]] Change change_to(std::span<const Real> settings, std::size_t parameters) const;
-  /// The evaluation has taken over changed settings.
-  void settings_act(Change change, std::vector<Real> acting);
+  /// What differs, bit for bit, from the settings that act: numbers of parameters come first, of inputs last.
+  [[nodiscard]] Change change_to(std::span<const Real> settings, std::size_t parameters, std::size_t inputs) const;
+  /// The evaluation is about to take over changed settings.
+  void prepare_change() { integrator_.prepare_change(); }
+  /// The evaluation has taken them over.
+  void settings_act(Change change, std::vector<Real> acting, std::span<const Real> x_star);
 
   /// Where a step from t by h ends; throws Error when it is none that can be taken.
   [[nodiscard]] Real end_of_step(Real t, Real h, std::optional<Real> stop_time) const;
   void advance(Real t_end);
 
-  [[nodiscard]] Point save() const { return {acting_, time_, integrator_.checkpoint()}; }
+  [[nodiscard]] Judgement judgement() { return integrator_.judgement(); }
+  /// As Integrator's; from the loop's time origin on.
+  void begin_errors_anew(Real from) { integrator_.begin_errors_anew(from); }
+
+  [[nodiscard]] Point save() { return {acting_, time_, integrator_.checkpoint()}; }
   /// As Integrator::restore; the evaluation has taken over the settings that act and the start time.
   bool restore(const Point& point, Tolerances tolerances);
 

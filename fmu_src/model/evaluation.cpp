@@ -45,6 +45,7 @@ void Evaluation::prepare(Stage stage, Settings& settings, const Standing& standi
     case Stage::settings:
     case Stage::state:
     case Stage::statistics:
+    case Stage::judgement:
       break;
     case Stage::inputs:
       settings.inputs.values(standing.since_origin, input_values_as_set_.data());

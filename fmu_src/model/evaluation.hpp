@@ -1,6 +1,8 @@
 // The closed loop under the settings that act now, and what is computed from it only when a variable asks for it.
 #pragma once
 
+#include <span>
+
 #include "closed_loop.hpp"
 #include "located_conditions.hpp"
 #include "loop/inputs.hpp"
@@ -45,6 +47,8 @@ class Evaluation {
   void event_indicators(const Standing& standing, Real tolerance, Real* values);
   /// Throws GameError when the game has no unique equilibrium.
   void prepare_equilibrium(Settings& settings);
+  /// That prepare_equilibrium found; empty where it was not asked for.
+  [[nodiscard]] std::span<const Real> x_star() const { return x_star_; }
 
   /// Signals and rates that prepare_signals found.
   [[nodiscard]] const Signals& signals() const { return signals_; }

@@ -106,14 +106,13 @@ void Instance::exit_initialization() {
                 (reason.empty() ? "the parameters or initial values are too large" : reason));
   }
   if (interface_ == Interface::model_exchange) {
-    model_exchange_.emplace(evaluation_,
-                            ModelExchange::Point{experiment_.start_time, initial_state_, initial_modes_, 0},
-                            experiment_.start_time);
+    model_exchange_.emplace(evaluation_, experiment_.start_time, initial_state_, initial_modes_, judging_rule(),
+                            evaluation_.x_star());
     phase_ = Phase::event_mode;
     return;
   }
   auto run = std::make_unique<CoSimulation>(evaluation_);
-  run->start(tolerances(), model_.variables.save(settings_));
+  run->start(tolerances(), model_.variables.save(settings_), judging_rule(), evaluation_.x_star());
   co_simulation_ = std::move(run);
   evaluation_.moved();
   phase_ = Phase::step_complete;
@@ -172,6 +171,10 @@ void Instance::get(Type type, std::span<const std::uint32_t> references, Real* v
   const Stages& needed = stages_of(type, references);
   View source = evaluation_.view(settings_, prepare(needed));
   if (needed[static_cast<std::size_t>(Stage::statistics)]) source.statistics = statistics();
+  if (needed[static_cast<std::size_t>(Stage::judgement)]) {
+    judgement_ = judgement();
+    source.judgement = &judgement_;
+  }
   scratch_.resize(references.size());
   for (std::size_t k = 0; k < references.size(); ++k) {
     const auto reference = static_cast<int>(references[k]);
@@ -187,6 +190,7 @@ void Instance::set(Type type, std::span<const std::uint32_t> references, const R
   const ModelVariables& variables = model_.variables;
   bool equilibrium_moved = false;
   bool state_set = false;
+  bool errors_begin_anew = false;
   Change change = Change::none;
   for (std::size_t k = 0; k < references.size(); ++k) {
     const int reference = known(references[k], type);
@@ -200,6 +204,10 @@ void Instance::set(Type type, std::span<const std::uint32_t> references, const R
     }
     if (family.is_state) {
       state_set = true;
+      continue;
+    }
+    if (family.only_judges) {
+      errors_begin_anew = true;
       continue;
     }
     equilibrium_moved = equilibrium_moved || family.moves_equilibrium;
@@ -217,6 +225,24 @@ void Instance::set(Type type, std::span<const std::uint32_t> references, const R
   }
   if (state_set) model_exchange_->set_state(scratch_);
   settings_changed(change, equilibrium_moved);
+  if (!errors_begin_anew) return;
+  if (co_simulation_) co_simulation_->begin_errors_anew(judging_rule().errors_from);
+  if (model_exchange_) model_exchange_->begin_errors_anew(judging_rule().errors_from);
+}
+
+JudgingRule Instance::judging_rule() const {
+  return {.settling_band = settings_.settling_band, .errors_from = settings_.judge_from - experiment_.start_time};
+}
+
+Judgement Instance::judgement() {
+  if (co_simulation_) return co_simulation_->judgement();
+  if (model_exchange_) return model_exchange_->judgement();
+  act();
+  if (model_.game.parameters.shape.hosts_all()) evaluation_.prepare_equilibrium(settings_);
+  Judge judge(evaluation_.loop());
+  judge.set_equilibrium(evaluation_.x_star());
+  judge.start(0.0, judging_rule(), {initial_state_.data(), evaluation_.inputs_at(standing())}, initial_modes_);
+  return judge.judgement();
 }
 
 void Instance::settings_changed(Change change, bool equilibrium_moved) {
@@ -388,21 +414,28 @@ void Instance::do_step(Real t, Real h) {
   std::vector<Real> numbers;
   if (touched_ != Change::none) {
     numbers = model_.variables.save(settings_);
-    change = co_simulation_->change_to(numbers, model_.variables.saved_parameters());
+    change = co_simulation_->change_to(numbers, model_.variables.saved_parameters(), model_.variables.saved_inputs());
     if (change == Change::parameters) check_settings();
   }
   touched_ = Change::none;
   evaluation_.moved();
   try {
+    if (change != Change::none) co_simulation_->prepare_change();
     if (change == Change::parameters) evaluation_.act(settings_);
     if (change == Change::input) evaluation_.act(settings_.inputs);
-    if (change != Change::none) co_simulation_->settings_act(change, std::move(numbers));
+    if (change != Change::none) co_simulation_->settings_act(change, std::move(numbers), evaluation_.x_star());
     co_simulation_->advance(end);
   } catch (const std::exception& error) {
     phase_ = Phase::error;
     failed_ = true;
     throw IntegrationError("the step from t = " + text_of(t) + " by h = " + text_of(h) + " failed: " + error.what());
   }
+}
+
+void Instance::enter_event_mode() {
+  act();
+  model_exchange_->accept_step();
+  phase_ = Phase::event_mode;
 }
 
 bool Instance::new_discrete_states() {
@@ -412,6 +445,8 @@ bool Instance::new_discrete_states() {
 
 void Instance::enter_continuous_time_mode() {
   check_settings();
+  act();
+  model_exchange_->begin_after_event(evaluation_.x_star());
   phase_ = Phase::continuous_time_mode;
 }
 
@@ -425,6 +460,7 @@ bool Instance::completed_integrator_step() {
     throw Error("the step ends at " + text_of(t) + ", after the stop time " + text_of(*stop));
   }
   const std::span<const Real> indicators = event_indicators();
+  model_exchange_->accept_step();
   return model_exchange_->is_event_due() ||
          std::any_of(indicators.begin(), indicators.end(), [](Real indicator) { return indicator > 0.0; });
 }
@@ -483,7 +519,7 @@ void Instance::get_nominals(std::span<Real> nominals) const {
   }
 }
 
-Snapshot Instance::save() const {
+Snapshot Instance::save() {
   if (failed_) throw Error("there is no state to save after a failed integration");
   Snapshot snapshot;
   snapshot.interface = interface_;
@@ -499,6 +535,7 @@ SnapshotShape Instance::snapshot_shape() const {
   return {.interface = interface_,
           .settings = model_.variables.saved_size(),
           .states = initial_state_.size(),
+          .inputs = at(evaluation_.loop().inputs().size()),
           .parameters = &model_.game.parameters,
           .steps = Integrator::most_steps_between_restarts(static_cast<int>(initial_state_.size()))};
 }
@@ -532,7 +569,10 @@ bool Instance::restore(const Snapshot& snapshot) {
   evaluation_.moved();
   evaluation_.costs_changed();
   model_exchange_.reset();
-  if (point) model_exchange_.emplace(evaluation_, std::move(*point), experiment_.start_time);
+  if (point) {
+    evaluation_.act(settings_);
+    model_exchange_.emplace(evaluation_, std::move(*point), experiment_.start_time);
+  }
   if (!snapshot.co_simulation) {
     co_simulation_.reset();
     phase_ = snapshot.phase;

@@ -62,7 +62,7 @@ class Instance {
   void do_step(Real t, Real h);
 
   // Model exchange
-  void enter_event_mode() { phase_ = Phase::event_mode; }
+  void enter_event_mode();
   /// True when the state moved.
   bool new_discrete_states();
   /// The absolute time of the next event that is known beforehand; infinite when there is none.
@@ -77,7 +77,7 @@ class Instance {
   void get_event_indicators(std::span<Real> values);
   void get_nominals(std::span<Real> nominals) const;
 
-  [[nodiscard]] Snapshot save() const;
+  [[nodiscard]] Snapshot save();
   /// A state that to_bytes() wrote; anything else, and settings that could not have been set, are refused.
   [[nodiscard]] Snapshot read(std::span<const char> bytes) const;
   /// False when this machine's arithmetic does not repeat the steps that led to the saved state bit for bit; the run
@@ -86,7 +86,7 @@ class Instance {
   [[nodiscard]] SnapshotShape snapshot_shape() const;
 
  private:
-  using Stages = std::array<bool, static_cast<std::size_t>(Stage::equilibrium) + 1>;
+  using Stages = std::array<bool, static_cast<std::size_t>(Stage::judgement) + 1>;
 
   /// The reference of a variable of this type; anything else is refused.
   [[nodiscard]] int known(std::uint32_t reference, Type type) const;
@@ -102,6 +102,8 @@ class Instance {
   void set_input_derivative(int slot, int order, Real value);
   void check_settings();
   std::span<const Real> event_indicators();
+  [[nodiscard]] JudgingRule judging_rule() const;
+  [[nodiscard]] Judgement judgement();
 
   Model model_;
   Interface interface_;
@@ -118,6 +120,7 @@ class Instance {
   std::unique_ptr<CoSimulation> co_simulation_;
   std::optional<ModelExchange> model_exchange_;
   std::vector<Real> scratch_;
+  Judgement judgement_;  // that was read last
   // the variables that were read last
   Type known_type_{};
   std::vector<std::uint32_t> known_references_;

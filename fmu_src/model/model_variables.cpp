@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <set>
 
@@ -94,9 +95,11 @@ class ModelVariables::Builder {
     add_switches();
     add_initial_state();
     add_tolerances();
+    add_judging_rule();
     add_inputs();
     add_outputs();
     add_inside_of_the_loop();
+    add_judgement();
     add_solver();
     require_distinct_names();
   }
@@ -467,6 +470,28 @@ class ModelVariables::Builder {
     add(std::move(absolute), one());
   }
 
+  void add_judging_rule() {
+    if (!shape_.hosts_all()) return;
+    Family band =
+        parameter("settling_band", "Nash error up to which the run counts as settled; 0: 2 % of the initial one",
+                  Variability::fixed);
+    band.declared_type = "Action";
+    band.unit = {"1", "1"};
+    band.range = Range::non_negative;
+    band.read = [](const View& view, int) { return view.settings->settling_band; };
+    band.write = [](Settings& settings, int, Real value) { settings.settling_band = value; };
+    add(std::move(band), one());
+
+    Family from =
+        parameter("judge_from", "Time from which error_peak is taken; setting it begins it anew", Variability::tunable);
+    from.declared_type = "Time";
+    from.unit = {"s", "s"};
+    from.only_judges = true;
+    from.read = [](const View& view, int) { return view.settings->judge_from; };
+    from.write = [](Settings& settings, int, Real value) { settings.judge_from = value; };
+    add(std::move(from), one());
+  }
+
   void add_input(const char* name, const char* description, const char* type, std::array<const char*, 2> unit,
                  const Elements& elements) {
     if (elements.empty()) return;
@@ -693,6 +718,42 @@ class ModelVariables::Builder {
         elements);
   }
 
+  /// Of the run up to here, between the integrator's steps too.
+  void add_judgement() {
+    const auto add_value = [&](Family family, auto read) {
+      family.stage = Stage::judgement;
+      family.read = [read](const View& view, int) { return static_cast<Real>(std::invoke(read, *view.judgement)); };
+      add(std::move(family), one());
+    };
+    if (shape_.hosts_all()) {
+      add_value({.name = "settling_time",
+                 .description = "Time from the start until nash_error last exceeded the settling band; until now while "
+                                "it does",
+                 .declared_type = "Time",
+                 .unit = {"s", "s"}},
+                &Judgement::settling_time);
+      add_value({.name = "settled",
+                 .description = "nash_error is within the settling band",
+                 .type = Type::boolean,
+                 .variability = Variability::discrete},
+                [](const Judgement& judgement) { return !judgement.outside; });
+    }
+    add_value({.name = "control_energy", .description = "Integral of u'u since the start"}, &Judgement::control_energy);
+    add_value({.name = "control_peak", .description = "Largest magnitude of an entry of u since the start"},
+              &Judgement::control_peak);
+    if (!shape_.hosts_all()) return;
+    add_value({.name = "error_peak",
+               .description = "Largest magnitude of an entry of x - x_star since judge_from; 0 before it",
+               .declared_type = "Action",
+               .unit = {"1", "1"}},
+              &Judgement::error_peak);
+    add_value({.name = "overshoot",
+               .description = "Farthest that an entry of x went beyond x_star, seen from its start, as a part of the "
+                              "largest initial magnitude of an entry of x - x_star",
+               .unit = {"1", "1"}},
+              &Judgement::overshoot);
+  }
+
   void add_solver() {
     const auto add_count = [&](const char* name, const char* description, auto read) {
       add({.name = name,
@@ -736,8 +797,12 @@ class ModelVariables::Builder {
 
 ModelVariables::ModelVariables(const Game& game) : order_(game.parameters.shape.order) {
   Builder(*this, game).add_all();
-  for (int reference = 0; reference < size(); ++reference) {
-    if (family(reference).causality == Causality::parameter) settable_.push_back(reference);
+  for (const bool only_judges : {false, true}) {
+    for (int reference = 0; reference < size(); ++reference) {
+      const Family& of = family(reference);
+      if (of.causality == Causality::parameter && of.only_judges == only_judges) settable_.push_back(reference);
+    }
+    if (!only_judges) acting_parameters_ = settable_.size();
   }
   if (game.expose == Expose::all) {
     states_.resize(at(StateLayout(game.parameters.shape).size()));

@@ -86,8 +86,9 @@ struct Family {
   Real nominal = 0.0;  ///< 0: not stated
   Stage stage = Stage::settings;
   bool moves_equilibrium = false;
-  int derivative_of = -1;  ///< family of states of which this one holds the derivatives, element by element
-  bool is_state = false;   ///< slots are positions in the state vector, as those of derivatives
+  bool only_judges = false;  ///< how a run is judged; the run does not depend on it
+  int derivative_of = -1;    ///< family of states of which this one holds the derivatives, element by element
+  bool is_state = false;     ///< slots are positions in the state vector, as those of derivatives
 
   AlignedVector Signals::* signal = nullptr;  ///< the vector of signals that holds the elements at their slots
 
@@ -144,14 +145,16 @@ class ModelVariables {
     return families_[at(one.family)].read(view, one.slot);
   }
 
-  /// All settings as numbers, in the order of the table, followed by the input polynomials.
+  /// All settings as numbers: parameters in the order of the table, those that only judge, the input polynomials.
   [[nodiscard]] std::vector<Real> save(const Settings& settings) const;
   void load(std::span<const Real> numbers, Settings& settings) const;
   /// Refuses saved numbers that could not have been set.
   void require_settable(std::span<const Real> numbers) const;
   [[nodiscard]] std::size_t saved_size() const { return settable_.size() + input_numbers_; }
-  /// How many of the saved numbers come before the input polynomials.
-  [[nodiscard]] std::size_t saved_parameters() const { return settable_.size(); }
+  /// How many of the saved numbers come first and are parameters on which runs depend, and how many come last and are
+  /// input polynomials.
+  [[nodiscard]] std::size_t saved_parameters() const { return acting_parameters_; }
+  [[nodiscard]] std::size_t saved_inputs() const { return input_numbers_; }
 
  private:
   class Builder;
@@ -160,6 +163,7 @@ class ModelVariables {
   std::vector<Variable> variables_;
   std::vector<int> settable_;  // parameters that can be set
   std::vector<int> states_;
+  std::size_t acting_parameters_ = 0;
   std::size_t input_numbers_ = 0;
   std::vector<int> order_;  // of the players
 };

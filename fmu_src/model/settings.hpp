@@ -15,6 +15,8 @@ struct Settings {
   bool allow_disconnected = false;
   Real tolerance_relative = 0.0;  ///< 0: not set
   Real tolerance_absolute = 0.0;  ///< 0: not set
+  Real settling_band = 0.0;       ///< 0: a part of the initial error
+  Real judge_from = 0.0;          ///< absolute, s
   Inputs inputs;                  ///< as ClosedLoop::inputs says
 };
 
@@ -29,6 +31,7 @@ enum class Stage {
   signals,      ///< signals and rates of the closed loop
   statistics,   ///< the work done
   equilibrium,  ///< state and x_star
+  judgement,    ///< of the run up to here
 };
 
 /// The sources of all variables; only those of the stages asked for are valid.
@@ -43,6 +46,7 @@ struct View {
   const Real* rate = nullptr;
   const Signals* signals = nullptr;
   const Real* x_star = nullptr;  ///< null unless it is known
+  const Judgement* judgement = nullptr;
   Statistics statistics;
 };
 

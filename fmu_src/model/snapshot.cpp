@@ -13,7 +13,7 @@ namespace mixed_order_game {
 namespace {
 
 constexpr std::string_view magic = "MOGstate";
-constexpr std::uint32_t format = 4;
+constexpr std::uint32_t format = 5;
 constexpr std::size_t fingerprint_size = 16;
 
 class Writer {
@@ -135,6 +135,21 @@ void write_statistics(Writer& writer, const Statistics& statistics) {
   }
 }
 
+std::size_t size_of(const Judgement& judgement) {
+  return 10 * 8 + 1 + 2 * 8 + 8 * (judgement.x_star.size() + judgement.side.size());
+}
+
+void write_judgement(Writer& writer, const Judgement& judgement) {
+  for (const Real value : {judgement.begun, judgement.until, judgement.last_outside, judgement.control_energy,
+                           judgement.control_peak, judgement.error_peak, judgement.farthest_beyond,
+                           judgement.errors_from, judgement.squared_band, judgement.largest_deviation}) {
+    writer.number(value);
+  }
+  writer.byte(judgement.outside ? 1 : 0);
+  writer.numbers(judgement.x_star);
+  writer.numbers(judgement.side);
+}
+
 void write_co_simulation(Writer& writer, const CoSimulation::Point& point) {
   const auto& [acting, time, checkpoint] = point;
   writer.numbers(acting);
@@ -143,12 +158,14 @@ void write_co_simulation(Writer& writer, const CoSimulation::Point& point) {
   writer.numbers(checkpoint.restart_state);
   write_modes(writer, checkpoint.restart_modes);
   write_statistics(writer, checkpoint.restart_statistics);
+  write_judgement(writer, checkpoint.restart_judgement);
   writer.number(checkpoint.steps_since_restart);
   writer.number(checkpoint.first_step);
   writer.number(checkpoint.time);
   writer.numbers(checkpoint.state);
   write_modes(writer, checkpoint.modes);
   write_statistics(writer, checkpoint.statistics);
+  write_judgement(writer, checkpoint.judgement);
 }
 
 void write_model_exchange(Writer& writer, const ModelExchange::Point& point) {
@@ -156,6 +173,10 @@ void write_model_exchange(Writer& writer, const ModelExchange::Point& point) {
   writer.numbers(point.state);
   write_modes(writer, point.modes);
   writer.number(point.events);
+  writer.number(point.accepted_time);
+  writer.numbers(point.accepted_state);
+  writer.numbers(point.accepted_inputs);
+  write_judgement(writer, point.judgement);
 }
 
 void write_payload(Writer& writer, const Snapshot& snapshot) {
@@ -214,12 +235,28 @@ void read_statistics(Reader& reader, Statistics& statistics) {
   }
 }
 
+Judgement read_judgement(Reader& reader, const SnapshotShape& shape) {
+  Judgement judgement;
+  for (Real* value : {&judgement.begun, &judgement.until, &judgement.last_outside, &judgement.control_energy,
+                      &judgement.control_peak, &judgement.error_peak, &judgement.farthest_beyond,
+                      &judgement.errors_from, &judgement.squared_band, &judgement.largest_deviation}) {
+    *value = reader.real();
+  }
+  judgement.outside = reader.boolean();
+  const Shape& game = shape.parameters->shape;
+  const std::size_t entries = game.hosts_all() ? at(game.actions()) : 0;
+  reader.numbers(entries, judgement.x_star);
+  reader.numbers(entries, judgement.side);
+  return judgement;
+}
+
 Checkpoint read_checkpoint(Reader& reader, const SnapshotShape& shape) {
   Checkpoint checkpoint;
   checkpoint.restart_time = reader.real();
   reader.numbers(shape.states, checkpoint.restart_state);
   read_modes(reader, *shape.parameters, checkpoint.restart_modes);
   read_statistics(reader, checkpoint.restart_statistics);
+  checkpoint.restart_judgement = read_judgement(reader, shape);
   checkpoint.steps_since_restart = read_count(reader);
   if (checkpoint.steps_since_restart > shape.steps) Reader::refuse("it counts too many steps");
   checkpoint.first_step = reader.real();
@@ -228,6 +265,10 @@ Checkpoint read_checkpoint(Reader& reader, const SnapshotShape& shape) {
   reader.numbers(shape.states, checkpoint.state);
   read_modes(reader, *shape.parameters, checkpoint.modes);
   read_statistics(reader, checkpoint.statistics);
+  checkpoint.judgement = read_judgement(reader, shape);
+  if (checkpoint.judgement.until > checkpoint.time || checkpoint.restart_judgement.until > checkpoint.restart_time) {
+    Reader::refuse("its times are out of order");
+  }
   if (checkpoint.time < checkpoint.restart_time) Reader::refuse("its times are out of order");
   return checkpoint;
 }
@@ -238,6 +279,10 @@ ModelExchange::Point read_model_exchange(Reader& reader, const SnapshotShape& sh
   reader.numbers(shape.states, point.state);
   read_modes(reader, *shape.parameters, point.modes);
   point.events = read_count(reader);
+  point.accepted_time = reader.real();
+  reader.numbers(shape.states, point.accepted_state);
+  reader.numbers(shape.inputs, point.accepted_inputs);
+  point.judgement = read_judgement(reader, shape);
   return point;
 }
 
@@ -252,9 +297,12 @@ std::size_t serialized_size(const Snapshot& snapshot, std::string_view guid) {
     size += 8 + 8 * acting.size() + 8 + 8;
     size += 8 + 8 * checkpoint.restart_state.size() + size_of(checkpoint.restart_modes) + statistics + 8 + 8;
     size += 8 + 8 + 8 * checkpoint.state.size() + size_of(checkpoint.modes) + statistics;
+    size += size_of(checkpoint.restart_judgement) + size_of(checkpoint.judgement);
   }
   if (snapshot.model_exchange) {
     size += 8 + 8 + 8 * snapshot.model_exchange->state.size() + size_of(snapshot.model_exchange->modes) + 8;
+    size += 8 + 8 + 8 * snapshot.model_exchange->accepted_state.size() + 8 +
+            8 * snapshot.model_exchange->accepted_inputs.size() + size_of(snapshot.model_exchange->judgement);
   }
   return magic.size() + 4 + 4 + guid.size() + 8 + size + fingerprint_size;
 }

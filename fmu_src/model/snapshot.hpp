@@ -30,6 +30,7 @@ struct SnapshotShape {
   Interface interface = Interface::co_simulation;
   std::size_t settings = 0;
   std::size_t states = 0;
+  std::size_t inputs = 0;
   const Parameters* parameters = nullptr;  ///< whose conditions have modes
   std::int64_t steps = 0;                  ///< the most that it can ask to repeat
 };

@@ -37,6 +37,10 @@ struct Simulation {
   [[nodiscard]] std::vector<Real> state() const {
     return {integrator.state(), integrator.state() + loop.layout().size()};
   }
+  /// For the judgement, which takes any.
+  [[nodiscard]] std::vector<Real> some_equilibrium() const {
+    return std::vector<Real>(at(loop.shape().actions()), -0.5);
+  }
   [[nodiscard]] Real largest_norm2() const {
     std::vector<Real> norm2(at(loop.shape().actions()));
     loop.weight_norms(integrator.state(), norm2.data());
@@ -82,13 +86,17 @@ TEST(Integrator, DoesNotDependOnCommunicationPoints) {
   for (const std::string& game : {paper_game, busy_game, switching_game}) {
     std::vector<std::vector<Real>> ends;
     Statistics statistics;
+    Judgement judgement;
     for (const int per_second : {64, 32, 8, 1}) {
       Simulation run(text_of(game));
-      run.integrator.start(0.0, {1e-6, 1e-8});
+      run.integrator.set_equilibrium(run.some_equilibrium());
+      run.integrator.start(0.0, {1e-6, 1e-8}, {.errors_from = 0.3});
       for (int k = 1; k <= 4 * per_second; ++k) run.integrator.advance(static_cast<Real>(k) / per_second);
       ends.push_back(run.state());
       if (per_second == 64) statistics = run.integrator.statistics();
+      if (per_second == 64) judgement = run.integrator.judgement();
       EXPECT_EQ(run.integrator.statistics(), statistics);
+      EXPECT_EQ(run.integrator.judgement(), judgement);
     }
     for (const auto& end : ends) EXPECT_TRUE(same_bits(end, ends.front())) << game;
   }
@@ -98,7 +106,8 @@ TEST(Integrator, RestoresCheckpointsBitForBit) {
   const Tolerances tolerances{1e-6, 1e-8};
   for (const std::string& game : {paper_game, busy_game, switching_game}) {
     Simulation run(text_of(game));
-    run.integrator.start(0.0, tolerances);
+    run.integrator.set_equilibrium(run.some_equilibrium());
+    run.integrator.start(0.0, tolerances, {.errors_from = 0.3});
     std::vector<Checkpoint> checkpoints;
     std::vector<std::vector<Real>> states;
     std::vector<Statistics> statistics;
@@ -113,10 +122,12 @@ TEST(Integrator, RestoresCheckpointsBitForBit) {
       for (Simulation* other : {&run, &fresh}) {
         EXPECT_TRUE(other->integrator.restore(checkpoints[from], tolerances)) << from;
         EXPECT_TRUE(same_bits(other->state(), states[from])) << from;
+        EXPECT_EQ(other->integrator.judgement(), checkpoints[from].judgement) << from;
         for (std::size_t k = from + 1; k <= 40; ++k) {
           other->integrator.advance(0.05 * static_cast<Real>(k));
           ASSERT_TRUE(same_bits(other->state(), states[k])) << "from " << from << " to " << k;
           ASSERT_EQ(other->integrator.statistics(), statistics[k]) << "from " << from << " to " << k;
+          ASSERT_EQ(other->integrator.judgement(), checkpoints[k].judgement) << "from " << from << " to " << k;
         }
       }
     }

@@ -395,13 +395,21 @@ TEST(ModelExchangeSetting, StatesByNameAreThoseOfTheStateVector) {
   names.push_back(importer.reference("d_ext[2,1]"));
   values.push_back(0.7);
   Importer twin;
+  // states that are set in event mode belong to the run that is judged
+  const auto but_judgement = [](Importer& one) {
+    std::vector<double> all = one.all();
+    for (const char* name : {"settling_time", "settled", "control_peak", "error_peak", "overshoot"}) {
+      all[one.reference(name)] = 0.0;
+    }
+    return all;
+  };
   const auto compare = [&] {
     ASSERT_EQ(fmi2SetReal(importer.component, names.data(), names.size(), values.data()), fmi2OK)
         << importer.last_message();
     EXPECT_EQ(importer.state(), std::vector<double>(values.begin(), values.end() - 1));
     ASSERT_EQ(twin.set("d_ext[2,1]", values.back()), fmi2OK);
     twin.move_to(0.0, std::vector<double>(values.begin(), values.end() - 1));
-    EXPECT_TRUE(same_values(importer, importer.all(), twin.all()));
+    EXPECT_TRUE(same_values(importer, but_judgement(importer), but_judgement(twin)));
     EXPECT_EQ(importer.rate(), twin.rate());
   };
   twin.begin();

@@ -22,9 +22,10 @@ from mixed_order_game.fmu.build import shipped_game
 from mixed_order_game.fmu.model import Value
 from mixed_order_game.fmu.schedule import read_disturbance, read_graph_schedule
 from mixed_order_game.names import parse_name
+from mixed_order_game.results.metrics import JUDGED
 from tests.conftest import FmuOf
 
-OUTPUTS = ("x", "x_star", "nash_error")
+OUTPUTS = ("x", "x_star", "nash_error", *JUDGED)
 
 
 @pytest.fixture(scope="module")
@@ -46,8 +47,9 @@ def test_defaults(fmu: Path) -> None:
     assert stems == {
         *("x", "v", "u", "nash_error", "x_star", "z", "W_norm2", "phi", "nn", "cost", "consensus_error"),
         *("gradient_norm", "solver_steps", "solver_rhs_evaluations", "solver_events"),
+        *JUDGED,
     }
-    assert len(result.columns) == 81
+    assert len(result.columns) == 87
     assert result.parameters["k1"] == 10.0
     assert result["solver_steps"][-1] > 100
     np.testing.assert_allclose(
@@ -126,7 +128,7 @@ def test_a_run_from_unix_time_is_one_from_zero(simulator: Simulator) -> None:
 
         def case(start: float, tolerance: float = tolerance) -> Result:
             return simulator.run(
-                start_values=with_moved_phases(simulator, UNIX - start),
+                start_values=with_moved_phases(simulator, UNIX - start) | {"judge_from": start + 1.5},
                 start_time=start,
                 stop_time=start + 2.0,
                 step=1.0 / 64.0,
@@ -149,7 +151,11 @@ def test_files_and_figures_of_a_run_from_unix_time(simulator: Simulator, tmp_pat
         )
         schedule = read_graph_schedule(graphs, simulator.model)
         return simulator.run(
-            start_values={**with_moved_phases(simulator, UNIX - start), **schedule.start_values(start)},
+            start_values={
+                **with_moved_phases(simulator, UNIX - start),
+                **schedule.start_values(start),
+                "judge_from": start + 1.5,
+            },
             start_time=start,
             stop_time=start + 2.0,
             step=1.0 / 64.0,

@@ -52,7 +52,7 @@ def compare(
     band: Annotated[
         float | None,
         typer.Option(
-            help="Largest |x - x*| that counts as settled.", show_default="2 % of the first run's initial one"
+            help="Norm of x - x* that counts as settled.", show_default="2 % of the first run's initial one"
         ),
     ] = None,
     figure: Annotated[

@@ -62,7 +62,7 @@ SettleTimeOption = Annotated[
 
 BandOption = Annotated[
     float | None,
-    typer.Option(help="Largest |x - x*| that counts as settled.", show_default="2 % of the initial one"),
+    typer.Option(help="Norm of x - x* that counts as settled.", show_default="2 % of the initial one"),
 ]
 
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON.")]

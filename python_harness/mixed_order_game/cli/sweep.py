@@ -17,7 +17,6 @@ from .options import (
     JsonOption,
     SettingsOption,
     SettleTimeOption,
-    StepOption,
     StopTimeOption,
     ToleranceOption,
     graphs_option,
@@ -83,7 +82,6 @@ def sweep(
     ] = None,
     seed: Annotated[int, typer.Option(min=0, help="Of everything that is drawn.")] = 0,
     stop_time: StopTimeOption = None,
-    step: StepOption = None,
     tolerance: ToleranceOption = None,
     settle_time: SettleTimeOption = None,
     band: BandOption = None,
@@ -162,7 +160,6 @@ def sweep(
             seed=seed,
             settings=Settings(
                 stop_time=model.stop_time if stop_time is None else stop_time,
-                step=model.step if step is None else step,
                 tolerance=model.tolerance if tolerance is None else tolerance,
                 settle_time=settle_time,
                 band=band,

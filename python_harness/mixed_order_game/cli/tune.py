@@ -28,7 +28,7 @@ def tune(
     *,
     settling_time: Annotated[
         float,
-        typer.Option(min=0.0, help="Wish in s: the largest |x - x*| stays within the band from here on."),
+        typer.Option(min=0.0, help="Wish in s: the norm of x - x* stays within the band from here on."),
     ],
     graphs: Annotated[
         list[str] | None,

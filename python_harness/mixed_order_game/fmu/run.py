@@ -36,6 +36,7 @@ from ..errors import ExperimentError, SimulationError
 from ..files.temporary import explained, new_folder
 from ..interrupts import noted_signals
 from ..names import split_names
+from ..results.metrics import JUDGED, final_begin
 from ..results.result import Result
 from ..times import in_seconds
 from ..version import package_version
@@ -316,7 +317,8 @@ class Simulator:
         if not (np.isfinite(tolerance) and 0.0 < tolerance < 1.0):
             raise ExperimentError(f"tolerance = {tolerance:g} is not between 0 and 1")
         start = self.model.expanded(start_values or {})
-        parameters = self.model.start_values(start)
+        judging = {} if "judge_from" in start else {"judge_from": final_begin(start_time, stop_time, None)}
+        parameters = self.model.start_values({**start, **judging})
         schedule = _schedule(self.model, changes or {}, time)
         disturbance = _disturbance(self.model, inputs, time)
         if inputs is not None:
@@ -326,7 +328,7 @@ class Simulator:
         messages = self._walk(
             time,
             recorder,
-            values={name: parameters[name] for name in start},
+            values={name: parameters[name] for name in (*start, *judging)},
             tolerance=tolerance,
             schedule=schedule,
             disturbance=disturbance,
@@ -343,6 +345,7 @@ class Simulator:
             time,
             recorder.columns(),
             parameters=parameters,
+            changed=self.model.changed_values(self.model.start_values(start)),
             step=step,
             tolerance=tolerance,
             stop_time=stop_time,
@@ -460,6 +463,7 @@ class Simulator:
         columns: Mapping[str, NDArray[np.float64]],
         *,
         parameters: Mapping[str, Value],
+        changed: Mapping[str, Value],
         stop_time: float,
         step: float,
         tolerance: float,
@@ -478,7 +482,7 @@ class Simulator:
             step=step,
             tolerance=tolerance,
             messages=messages,
-            changed=self.model.changed_values(parameters),
+            changed=changed,
         )
 
     def _initialize(self, values: Mapping[str, Value], time: Sequence[float], tolerance: float) -> None:
@@ -502,7 +506,7 @@ class Simulator:
         if isinstance(outputs, str):  # as the command takes them
             outputs = split_names(outputs)
         if outputs is not None:
-            return self.model.select([*outputs, "x_star"])
+            return self.model.select([*outputs, "x_star", "nash_error", *JUDGED])
         return [self.model.variable(name) for name in self.model.signals()]
 
     def _log(self, _: object, _name: bytes, status: int, _category: bytes, message: bytes) -> None:
@@ -523,18 +527,18 @@ class Recorder(Protocol):
 
 
 class Block:
-    """Variables that are all reals or all integers, read in one call into a row of their values."""
+    """Variables of one type, read in one call into a row of their values."""
 
     def __init__(self, variables: Sequence[Variable], rows: int) -> None:
         self.variables = variables
-        real = all(variable.type == "Real" for variable in variables)
-        kind = c_double if real else c_int
-        self._getter = "fmi2GetReal" if real else "fmi2GetInteger"
+        kind = variables[0].type if variables else "Real"
+        number = c_double if kind == "Real" else c_int
+        self._getter = f"fmi2Get{kind}"
         self._references = _references(variables)
-        self.values = np.empty((rows, len(variables)), dtype=np.float64 if real else np.int32)
+        self.values = np.empty((rows, len(variables)), dtype=np.float64 if kind == "Real" else np.int32)
         """(rows, variables)"""
         buffer: Any = self.values
-        self._rows: Any = (kind * len(variables) * rows).from_buffer(buffer) if variables else None
+        self._rows: Any = (number * len(variables) * rows).from_buffer(buffer) if variables else None
 
     def reader(self, slave: Any) -> Callable[[int], None]:
         """What reads all of them into a row."""
@@ -560,23 +564,22 @@ class _Columns:
     def __init__(self, variables: Sequence[Variable], samples: int) -> None:
         self._variables = variables
         self._blocks = [
-            Block([variable for variable in variables if (variable.type == "Real") is real], samples)
-            for real in (True, False)
+            Block([variable for variable in variables if variable.type == kind], samples)
+            for kind in ("Real", "Integer", "Boolean")
         ]
 
     def reader(self, slave: Any) -> Callable[[int], None]:
-        reals, others = (block.reader(slave) for block in self._blocks)
+        readers = [block.reader(slave) for block in self._blocks if block.variables]
 
         def read(sample: int) -> None:
-            reals(sample)
-            others(sample)
+            for reader in readers:
+                reader(sample)
 
         return read
 
     def columns(self) -> dict[str, NDArray[np.float64]]:
         """Columns in the order of the variables."""
-        reals, others = (block.columns() for block in self._blocks)
-        columns = reals | others
+        columns = {name: column for block in self._blocks for name, column in block.columns().items()}
         return {variable.name: columns[variable.name] for variable in self._variables}
 
 

@@ -78,6 +78,23 @@ the game's unknown dynamics lack does not. A factor of 1 is declared `constant`,
 change `tunable`.
 """
 
+JUDGED = """## What judges a run
+
+`settling_time`, `settled`, `control_energy`, `control_peak`, `error_peak` and `overshoot` tell of the run up
+to the present time, and do not depend on how it is sampled: they are found along the integrator's own steps,
+peaks and crossings between their ends by its interpolation. Reading them leaves no trace in the run.
+
+- A run is settled while `nash_error` is within the band: `settling_band`, or 2 % of its initial value. After
+  a change of the costs it is measured to the equilibrium then in force. Where the initial value is 0 and no
+  band is set, `settling_time` is 0.
+- `error_peak` begins at `judge_from`, an absolute time, and is 0 before it. Setting `judge_from` during the
+  run, to whatever value, begins it anew at once, at `judge_from` or now, whichever is later.
+- Where the control jumps, because a parameter changes, say, `control_peak` counts both sides.
+- By model exchange they are found at each accepted step (`fmi2CompletedIntegratorStep`), from Hermite's
+  cubic between its ends, and are as fine as the importer's steps allow.
+- An FMU of some players knows no equilibrium, and has `control_energy` and `control_peak` of its own players.
+"""
+
 
 def fmu_reference(model: Model) -> str:
     """The page (Markdown) of an FMU: experiment, capabilities and every kind of variable."""
@@ -108,6 +125,7 @@ def fmu_reference(model: Model) -> str:
             ],
         ),
         DERIVATIVES,
+        JUDGED,
     ]
     for title, causalities in SECTIONS:
         groups = _groups(model, causalities)

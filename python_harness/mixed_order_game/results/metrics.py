@@ -1,6 +1,7 @@
 """What people compare between runs: settling time, overshoot, control energy, final error, events.
 
-Pure functions of sampled signals; Result.metrics gathers them for a run.
+The FMU judges a run along its integrator's own steps, so that its figures do not depend on the samples;
+those of samples serve what it did not judge: another band, another window, results of other programs.
 """
 
 from collections.abc import Mapping
@@ -15,21 +16,20 @@ from ..times import in_seconds, time_slack
 FloatArray = NDArray[np.float64]
 
 SETTLED = 0.02
-"""Default band of the settling time, as a part of the largest initial |x - x*|."""
+"""Default band of the settling time, as a part of the initial norm of x - x*."""
 
 FINAL_PART = 0.8
 """Part of the run after which the final error is judged, when no time is given."""
 
-START_STEPS = 10
-FINER = 20
-"""The first START_STEPS steps are sampled FINER times as often: the control begins with a fast transient."""
+JUDGED = ("settling_time", "settled", "control_energy", "control_peak", "error_peak", "overshoot")
+"""Variables of the FMU that judge a run up to the time at which they are read."""
 
 
 @dataclass(frozen=True)
 class Metrics:
     """Figures of one run. NaN: not recorded, or for settling_time that the run does not settle."""
 
-    settling_time: float  # s since the beginning, until the largest |x - x*| stays within the band
+    settling_time: float  # s since the beginning, until the norm of x - x* stays within the band
     overshoot: float  # farthest beyond x*, as a part of the largest initial |x - x*|
     control_energy: float  # integral of |u|^2 over the run
     control_peak: float  # largest |u_il|
@@ -53,6 +53,26 @@ METRIC_UNITS: Mapping[str, str] = {
 """The figures that tables show, in their order, with their units; those of x and u are the game's own."""
 
 
+def final_begin(start: float, stop: float, settle_time: float | None) -> float:
+    """Time in s from which the final error is taken; default 80 % of the run."""
+    return start + FINAL_PART * (stop - start) if settle_time is None else settle_time
+
+
+def judged_metrics(
+    judged: Mapping[str, float], *, initial_error: float, band: float, events: float
+) -> Metrics:
+    """Figures that the FMU found: values of JUDGED at the end, nash_error at the start, the band set or 0."""
+    return Metrics(
+        settling_time=judged["settling_time"] if judged["settled"] else float("nan"),
+        overshoot=judged["overshoot"],
+        control_energy=judged["control_energy"],
+        control_peak=judged["control_peak"],
+        final_error=judged["error_peak"],
+        events=events,
+        band=band or SETTLED * initial_error,
+    )
+
+
 def sampled_metrics(
     time: FloatArray,
     deviation: FloatArray,
@@ -63,8 +83,8 @@ def sampled_metrics(
     settle_time: float | None = None,
 ) -> Metrics:
     """Figures of samples: time (T,) in s, deviation x - x* (T, N, D), controls u (T, N, D) or None."""
-    error = np.abs(deviation).max(axis=(1, 2))
-    begin = time[0] + FINAL_PART * (time[-1] - time[0]) if settle_time is None else settle_time
+    error = np.linalg.norm(deviation, axis=(1, 2))
+    begin = final_begin(time[0], time[-1], settle_time)
     late = time >= begin - time_slack(begin, time[-1])
     if not late.any():
         raise ResultError(f"there is no sample from {in_seconds(begin)} on")
@@ -74,7 +94,7 @@ def sampled_metrics(
         overshoot=overshoot(deviation),
         control_energy=float("nan") if u is None else control_energy(time, u),
         control_peak=float("nan") if u is None else float(np.abs(u).max()),
-        final_error=float(error[late].max()),
+        final_error=float(np.abs(deviation[late]).max()),
         events=events,
         band=width,
     )
@@ -100,26 +120,15 @@ def settling_time(time: FloatArray, error: FloatArray, band: float) -> float:
 def overshoot(deviation: FloatArray) -> float:
     """How far an entry of x - x* (T, N, D) goes beyond 0, seen from its start, over the largest initial one.
 
-    Entries that start at their equilibrium count on both sides. 0 if every entry starts there and stays.
+    Entries that start at their equilibrium count on both sides. 0 if every entry starts there.
     """
     start = deviation[0]
     scale = float(np.abs(start).max())
     beyond = float(np.where(start == 0.0, np.abs(deviation), -np.sign(start) * deviation).max(initial=0.0))
-    if scale == 0.0:
-        return 0.0 if beyond == 0.0 else float("inf")
-    return max(beyond, 0.0) / scale
+    return max(beyond, 0.0) / scale if scale > 0.0 else 0.0
 
 
 def control_energy(time: FloatArray, u: FloatArray) -> float:
     """Integral of |u|^2 over time (T,), by the trapezoidal rule; u (T, N, D)."""
     power = (u * u).sum(axis=(1, 2))
     return float(0.5 * np.sum((power[1:] + power[:-1]) * np.diff(time)))
-
-
-def sample_times(stop_time: float, step: float) -> FloatArray:
-    """Times from 0 to stop_time, every step, the first ten steps twenty times finer; in s."""
-    count = max(1, round(stop_time / step))
-    regular = stop_time * (np.arange(count + 1) / count)
-    first = min(START_STEPS, count)
-    fine = regular[first] * (np.arange(first * FINER) / (first * FINER))
-    return np.concatenate([fine, regular[first:]])

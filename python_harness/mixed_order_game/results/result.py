@@ -6,7 +6,7 @@ N players, D coordinates, q neurons, T samples. Actions carry the game's own len
 import csv
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
@@ -20,7 +20,15 @@ from ..files.writing import RESULT, write_file
 from ..names import indices_of, parse_name
 from ..notebook import digits, folded, page, paragraph, table
 from ..times import in_seconds, time_slack
-from .metrics import METRIC_UNITS, Metrics, sampled_metrics
+from .metrics import (
+    JUDGED,
+    METRIC_UNITS,
+    Metrics,
+    final_begin,
+    judged_metrics,
+    sampled_metrics,
+    settling_time,
+)
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -224,18 +232,37 @@ class Result:
         return self.measured()
 
     def measured(self, *, band: float | None = None, settle_time: float | None = None) -> Metrics:
-        """The metrics with a band of one's own.
+        """The metrics, as the FMU judged the run; by the samples where it did not, or not so.
 
-        band: largest |x - x*| that counts as settled; default 2 % of the initial one.
-        settle_time: time in s from which the final error is taken; default 80 % of the run.
-        Raises ResultError if x or x_star was not recorded, or nothing was from settle_time on.
+        band: norm of x - x* that counts as settled; default that of the run, 2 % of the initial one.
+        settle_time: time in s from which the final error is taken; default that of the run, its last fifth.
+        Raises ResultError if the FMU did not judge the run and x or x_star was not recorded, or if nothing
+        was from settle_time on.
         """
-        events = self.columns.get("solver_events")
+        count = self.columns.get("solver_events")
+        events = float("nan") if count is None else float(count[-1])
+        if not self.columns.keys() >= {*JUDGED, "nash_error"}:
+            return self._sampled(events, band, settle_time)
+        judged = judged_metrics(
+            {name: float(self[name][-1]) for name in JUDGED},
+            initial_error=float(self.nash_error[0]),
+            band=float(self.parameters.get("settling_band", 0.0)),
+            events=events,
+        )
+        from_then = float(self.parameters.get("judge_from", final_begin(self.time[0], self.time[-1], None)))
+        if band is not None and band != judged.band:
+            settling = settling_time(self.time, self.nash_error, band)
+            judged = replace(judged, settling_time=settling, band=band)
+        if settle_time is not None and settle_time != from_then:
+            judged = replace(judged, final_error=self.largest_error(settle_time))
+        return judged
+
+    def _sampled(self, events: float, band: float | None, settle_time: float | None) -> Metrics:
         return sampled_metrics(
             self.time,
             self.x - self.equilibria,
             self.u if indices_of(self.columns, "u") else None,
-            events=float("nan") if events is None else float(events[-1]),
+            events=events,
             band=band,
             settle_time=settle_time,
         )
@@ -358,7 +385,7 @@ class Result:
             "parameters": dict(self.parameters),
             "changed": dict(self.changed),
             "seed": self.seed,
-            "metrics": self.metrics.as_json() if {"x", "x_star"} <= stems else {},
+            "metrics": self.metrics.as_json() if {"x", "x_star"} <= stems or {*JUDGED} <= stems else {},
             "units": dict(self.units),
             "messages": list(self.messages),
         }

@@ -172,8 +172,8 @@ def compare(
     settle_time
         Time in s from which the final error is taken; default 80 % of the run.
     band
-        Largest |x - x*| that counts as settled, in the game's length unit; default 2 % of the largest initial
-        |x - x*| of the first run, for all runs.
+        Norm of x - x* that counts as settled, in the game's length unit; default 2 % of the first run's
+        initial one, for all runs.
 
     Returns
     -------
@@ -268,11 +268,11 @@ def _variants_of(
             start = {**shared, **model.expanded(values)}
             changed = model.changed_values(model.start_values(start))
             try:
-                result = sampler.record(start, settings)
+                result = sampler.record(start, replace(settings, band=band))
             except SimulationError as error:
                 yield Compared(label, changed, None, None, str(error))
                 continue
-            found = result.measured(band=band, settle_time=settings.settle_time)
+            found = result.metrics
             band = found.band if band is None else band
             yield Compared(label, changed, result, found)
 

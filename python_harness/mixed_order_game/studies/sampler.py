@@ -1,20 +1,17 @@
-"""One loaded FMU that turns start values into the figures of a run, with few calls from Python."""
+"""One loaded FMU that turns start values into the figures of a run, in a handful of calls."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..arguments import number_argument
 from ..errors import ExperimentError
 from ..fmu.model import Model, Value
 from ..fmu.run import Block, Simulator
-from ..results.metrics import Metrics, sample_times, sampled_metrics
+from ..results.metrics import JUDGED, Metrics, final_begin, judged_metrics
 from ..results.result import Result
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -22,18 +19,16 @@ class Settings:
     """What all runs of a sweep have in common. Times in s."""
 
     stop_time: float = 20.0
-    step: float = 0.02
+    step: float = 0.02  # of the samples that are recorded; no figure depends on it
     tolerance: float = 1e-6
     settle_time: float | None = None  # beginning of the final error; None: 80 % of the run
-    band: float | None = None  # of the settling time; None: 2 % of the largest initial |x - x*|
+    band: float | None = None  # of the settling time; None: 2 % of the initial norm of x - x*
 
     def __post_init__(self) -> None:
         for name in ("stop_time", "step", "tolerance"):
             value = number_argument(getattr(self, name), name, ExperimentError)
             if not (np.isfinite(value) and value > 0.0):
                 raise ExperimentError(f"{name} = {value:g} is not positive")
-        if self.step > self.stop_time:
-            raise ExperimentError(f"step = {self.step:g} s is longer than the run, {self.stop_time:g} s")
         for name in ("settle_time", "band"):
             if getattr(self, name) is not None:
                 number_argument(getattr(self, name), name, ExperimentError)
@@ -42,87 +37,59 @@ class Settings:
         if self.band is not None and not (np.isfinite(self.band) and self.band > 0.0):
             raise ExperimentError(f"band = {self.band:g} is not positive")
 
+    def judging(self) -> dict[str, Value]:
+        """Start values by which the FMU judges as these settings say."""
+        band: dict[str, Value] = {} if self.band is None else {"settling_band": self.band}
+        return {"judge_from": final_begin(0.0, self.stop_time, self.settle_time), **band}
+
 
 class Sampler(Simulator):
-    """A Simulator whose runs give their figures, at times that are finer where the control begins."""
+    """A Simulator whose runs give their figures: the FMU judges them itself, in a handful of calls a run."""
 
     def measure(self, values: Mapping[str, Value], settings: Settings) -> Metrics:
         """Figures of the run with these start values. Raises VariableError, SimulationError as run does."""
-        time = sample_times(settings.stop_time, settings.step)
-        recorder = _Signals(self.model, len(time))
-        self.walk(time, recorder, values=values, tolerance=settings.tolerance)
-        return sampled_metrics(
-            time,
-            recorder.deviation,
-            recorder.u,
-            events=recorder.events,
-            band=settings.band,
-            settle_time=settings.settle_time,
-        )
+        figures = _Figures(self.model)
+        start = {**settings.judging(), **values}
+        self.walk(np.array([0.0, settings.stop_time]), figures, values=start, tolerance=settings.tolerance)
+        return figures.metrics(settings)
 
     def record(self, values: Mapping[str, Value], settings: Settings) -> Result:
-        """The same run, on the same times, as a Result with x, u, x_star, nash_error and solver_events."""
-        time = sample_times(settings.stop_time, settings.step)
-        recorder = _Signals(self.model, len(time))
-        messages = self.walk(time, recorder, values=values, tolerance=settings.tolerance)
-        return self.result(
-            time,
-            recorder.columns(),
-            parameters=self.model.start_values(values),
+        """The same run as a Result with samples of x, u, x_star, nash_error and solver_events."""
+        return self.run(
+            start_values={**settings.judging(), **values},
             stop_time=settings.stop_time,
             step=settings.step,
             tolerance=settings.tolerance,
-            messages=messages,
+            outputs=["x", "u", "solver_events"],
         )
 
 
-class _Signals:
-    """Records x and u at every sample, x* at the first one and the sphere events at the last one."""
+class _Figures:
+    """Reads the distance from the equilibrium at the first sample and what the FMU found at the last."""
 
-    def __init__(self, model: Model, samples: int) -> None:
-        entries = [(i, k) for i in range(1, model.players + 1) for k in range(1, model.dimension + 1)]
-
-        def block(stems: Sequence[str], rows: int) -> Block:
-            names = [f"{stem}[{i},{k}]" for stem in stems for i, k in entries]
-            return Block([model.variable(name) for name in names], rows)
-
-        self._shape = (samples, model.players, model.dimension)
-        self._xu, self._x_star = block(["x", "u"], samples), block(["x_star"], 1)
-        self._events = Block([model.variable("solver_events")], 1)
+    def __init__(self, model: Model) -> None:
+        self._start = Block([model.variable("nash_error")], 1)
+        wanted = [model.variable(name) for name in (*JUDGED, "solver_events")]
+        self._end = [
+            Block([one for one in wanted if one.type == kind], 1) for kind in ("Real", "Integer", "Boolean")
+        ]
 
     def reader(self, slave: Any) -> Callable[[int], None]:
-        xu, events, last = self._xu.reader(slave), self._events.reader(slave), self._shape[0] - 1
-        self._x_star.reader(slave)(0)
+        self._start.reader(slave)(0)
+        readers = [block.reader(slave) for block in self._end]
 
         def read(sample: int) -> None:
-            xu(sample)
-            if sample == last:
-                events(0)
+            if sample:
+                for reader in readers:
+                    reader(0)
 
         return read
 
-    @property
-    def deviation(self) -> FloatArray:
-        """x - x*, (T, N, D)."""
-        x, _ = np.hsplit(self._xu.values, 2)
-        return (x - self._x_star.values).reshape(self._shape)
-
-    @property
-    def u(self) -> FloatArray:
-        """(T, N, D)."""
-        return np.hsplit(self._xu.values, 2)[1].reshape(self._shape)
-
-    @property
-    def events(self) -> int:
-        """Weight columns that entered or left the sphere."""
-        return int(self._events.values[0, 0])
-
-    def columns(self) -> dict[str, FloatArray]:
-        """What a Result holds."""
-        samples = self._shape[0]
-        constants = self._x_star.columns() | self._events.columns()
-        return {
-            **self._xu.columns(),
-            **{name: np.full(samples, value[0]) for name, value in constants.items()},
-            "nash_error": np.linalg.norm(self.deviation, axis=(1, 2)),
-        }
+    def metrics(self, settings: Settings) -> Metrics:
+        found = {name: float(value[0]) for block in self._end for name, value in block.columns().items()}
+        return judged_metrics(
+            found,
+            initial_error=float(self._start.values[0, 0]),
+            band=settings.band or 0.0,
+            events=found["solver_events"],
+        )

@@ -238,7 +238,7 @@ def tune(
         An FMU (.fmu), a game file (.toml), a game of the package by its name, a `Game`; the paper's example
         for None.
     settling_time
-        Wish in s: the largest |x - x*| stays within the band from here on.
+        Wish in s: the norm of x - x* stays within the band from here on.
     graphs
         Graphs to tune for; default the game's own.
     gains
@@ -248,8 +248,7 @@ def tune(
     start_values
         Parameters that all runs share.
     band
-        Largest |x - x*| that counts as settled, in the game's length unit; default 2 % of the largest initial
-        one.
+        Norm of x - x* that counts as settled, in the game's length unit; default 2 % of the initial one.
     largest_error
         Largest |x - x*| in the last fifth of the runs that verify; default any.
     stop_time
@@ -364,11 +363,11 @@ class _Search:
         self.loops = [graph.adjacency for graph in self.graphs]
         self.deviation = initial_deviation(self.game)
         self.actions = len(owners(self.game))
-        largest = float(np.abs(self.deviation[: self.actions]).max())
+        distance = float(np.linalg.norm(self.deviation[: self.actions]))
         rounding = 1e-12 * (1.0 + float(np.abs(self.game.x0).max()))
-        if band is None and largest <= rounding:
+        if band is None and distance <= rounding:
             raise TuneError("every player starts at its equilibrium: give the band that counts as settled")
-        self.band = SETTLED * largest if band is None else band
+        self.band = SETTLED * distance if band is None else band
         if self.band <= 0.0:
             raise TuneError(f"the band {self.band:g} is not positive")
         self.start = {name: float(model.start_values(self.fixed)[name]) for name in self.names}
@@ -526,14 +525,14 @@ class _Search:
         return UNSTABLE + abscissa if abscissa >= 0.0 else self._overrun(loop, target) - SLACK
 
     def _overrun(self, loop: FloatArray, target: float) -> float:
-        """log(largest |x - x*| / band) from the target time on, to twice that time."""
+        """log(largest norm of x - x* / band) from the target time on, to twice that time."""
         from scipy.linalg import expm
 
         state = expm(loop * target) @ self.deviation
         step = expm(loop * (target / WINDOW))
         largest = 0.0
         for _ in range(WINDOW + 1):
-            largest = max(largest, float(np.abs(state[: self.actions]).max()))
+            largest = max(largest, float(np.linalg.norm(state[: self.actions])))
             state = step @ state
         return float(np.log(max(largest, np.finfo(float).tiny) / self.band))
 
@@ -544,7 +543,7 @@ class _Search:
         with np.errstate(over="ignore", invalid="ignore"):
             power = np.square(np.einsum("cn,tnl->tcl", control, states)).sum(axis=(1, 2))
             energy = 0.5 * float(np.sum(power[1:] + power[:-1])) * target / STEPS
-            largest = float(np.abs(states[STEPS:, : self.actions]).max())
+            largest = float(np.linalg.norm(states[STEPS:, : self.actions], axis=(1, 2)).max())
         if not (np.isfinite(energy) and np.isfinite(largest)):
             return float(np.exp(UNSTABLE / 10.0)), UNSTABLE
         return energy, float(np.log(max(largest, np.finfo(float).tiny) / self.band))
