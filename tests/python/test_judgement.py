@@ -52,9 +52,9 @@ def test_every_communication_step_tells_what_fine_samples_do(fmu_of: FmuOf, jump
     for result in runs:
         for figure, value in expected.items():
             assert result[figure][-1] == pytest.approx(value, rel=1e-5, abs=1e-9), figure
-    for figure in JUDGED:  # whatever was read on the way
-        assert runs[0][figure][-1] == pytest.approx(runs[1][figure][-1], rel=1e-12)
-        assert runs[0][figure][-1] == pytest.approx(runs[2][figure][-1], rel=1e-12)
+    for figure in JUDGED:  # steps after a change end at a communication point
+        assert runs[0][figure][-1] == pytest.approx(runs[1][figure][-1], rel=1e-7)
+        assert runs[0][figure][-1] == pytest.approx(runs[2][figure][-1], rel=1e-7)
 
 
 def test_samples_are_never_beyond(fmu: Path) -> None:

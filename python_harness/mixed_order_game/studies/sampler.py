@@ -86,7 +86,11 @@ class _Figures:
         return read
 
     def metrics(self, settings: Settings) -> Metrics:
-        found = {name: float(value[0]) for block in self._end for name, value in block.columns().items()}
+        found = {
+            variable.name: float(value)
+            for block in self._end
+            for variable, value in zip(block.variables, block.values[0], strict=True)
+        }
         return judged_metrics(
             found,
             initial_error=float(self._start.values[0, 0]),
