@@ -1,6 +1,7 @@
 #include "expression/tape.hpp"
 
 #include <algorithm>
+#include <array>
 #include <map>
 
 #include "kernels/kernels.hpp"
@@ -125,6 +126,8 @@ void Tapes::run(std::size_t number, const LeafValues& leaves, Real* result) cons
   Real* rows = rows_[number].data();
   const std::size_t lanes = at(tape.lanes);
   const std::size_t players = tape.players.size();
+  std::array<const Real*, most_lanes> points{};  // that the players see
+  for (std::size_t lane = 0; lane < players; ++lane) points[lane] = leaves.points + tape.players[lane] * leaves.stride;
   for (const LeafRow& leaf : tape.leaves) {
     Real* row = rows + at(leaf.row) * lanes;
     const int* index = leaf.index.data();
@@ -133,9 +136,7 @@ void Tapes::run(std::size_t number, const LeafValues& leaves, Real* result) cons
     };
     switch (leaf.kind) {
       case LeafKind::action:
-        for (std::size_t lane = 0; lane < players; ++lane) {
-          row[lane] = leaves.points[tape.players[lane] * leaves.stride + index[lane]];
-        }
+        for (std::size_t lane = 0; lane < players; ++lane) row[lane] = points[lane][index[lane]];
         break;
       case LeafKind::velocity:
         gather(leaves.velocities);
