@@ -46,6 +46,23 @@ def test_python() -> None:
     assert Path("plane.pdf").is_file()
 
 
+def test_readme() -> None:
+    """Its game, what it shows of the FMU and of Python, and command lines that are not run elsewhere."""
+    text = (DOCS.parents[1] / "README.md").read_text(encoding="utf-8")
+    assert CliRunner().invoke(app, ["build", "five_vehicles", "--output", "five_vehicles.fmu"]).exit_code == 0
+    (game,) = re.findall(r"^```toml\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
+    Path("my_game.toml").write_text(game, encoding="utf-8")
+    for line in re.findall(r"^mog (?:build|run) .*", text, re.MULTILINE):
+        result = CliRunner().invoke(app, shlex.split(line, comments=True)[1:])
+        assert result.exit_code == 0, f"{line}: {result.output}"
+    assert Path("run.csv").is_file()
+    assert Path("my_game.fmu").is_file()
+    for block in re.findall(r"^```python\n(.*?)^```", text, re.MULTILINE | re.DOTALL):
+        exec(compile(block, "README.md", "exec"), {})  # noqa: S102 - our own documentation
+    for target in re.findall(r"\]\(([^)#:]+)\)", text):
+        assert (DOCS.parents[1] / target).exists(), target
+
+
 def test_every_command_is_described() -> None:
     text = (DOCS / "commands.md").read_text(encoding="utf-8")
     for command in app.registered_commands:
