@@ -14,7 +14,14 @@ GainRows::GainRows(const Shape& shape) : k3(at(shape.hosts())) {
   sharpness_of_activations.resize(at(shape.hosts()));
 }
 
-void GainRows::refresh(const Shape& shape, const Gains& gains, const RbfNetwork& rbf) {
+void GainRows::refresh(const Parameters& parameters) {
+  const Shape& shape = parameters.shape;
+  const Gains& gains = parameters.gains;
+  const RbfNetwork& rbf = parameters.rbf;
+  u_max.clear();
+  for (int p = 0; p < (parameters.u_max.empty() ? 0 : shape.own_entries()); ++p) {
+    u_max.push_back(parameters.u_max[at(shape.entry_of_own(p))]);
+  }
   for (int h = 0; h < shape.hosts(); ++h) {
     const Real width = rbf.width[at(shape.host(h))];
     sharpness_of_activations[at(h)] = 1.0 / (width * width);
@@ -54,7 +61,7 @@ ClosedLoop::ClosedLoop(Parameters parameters)
 void ClosedLoop::refresh() {
   parameters_.disturbance->time_origin = time_origin_;
   parameters_.refresh();
-  gains_.refresh(parameters_.shape, parameters_.gains, parameters_.rbf);
+  gains_.refresh(parameters_);
 }
 
 void ClosedLoop::set_time_origin(Real time_origin) {
@@ -103,7 +110,8 @@ Plants ClosedLoop::plants(const Real* state, const Real* inputs, Signals& signal
 }
 
 void ClosedLoop::evaluate_errors(const Real* state, const Real* inputs, const Modes& modes, Signals& signals) const {
-  const auto& [shape, gains, strategy, rbf, graph, cost, dynamics, disturbance, initial, named, guess] = parameters_;
+  const auto& [shape, gains, strategy, rbf, graph, cost, dynamics, disturbance, initial, named, guess, u_max] =
+      parameters_;
   const auto [x, reference] = plants(state, inputs, signals);
   const Real* gradient = signals.gradient.data();
   const Real* k2 = gains_.k2.data();
@@ -165,12 +173,14 @@ void ClosedLoop::evaluate_control(Signals& signals) const {
   const Real* phi = signals.robust.data();
   Real* u = signals.control.data();
   for (std::size_t p = 0; p < own_.size(); ++p) u[p] = terms::control(k[p], e[p], s[p], phi[p]);
+  for (std::size_t p = 0; p < gains_.u_max.size(); ++p) u[p] = terms::within_bound(u[p], gains_.u_max[p]);
 }
 
 void ClosedLoop::evaluate(Real t, const Real* state, const Real* inputs, const Modes& modes, Signals& signals,
                           Real* rate) const {
   const Kernels& kernel = kernels();
-  const auto& [shape, gains, strategy, rbf, graph, cost, dynamics, disturbance, initial, named, guess] = parameters_;
+  const auto& [shape, gains, strategy, rbf, graph, cost, dynamics, disturbance, initial, named, guess, u_max] =
+      parameters_;
   const int n = shape.own_entries();
   const Real* d_ext = inputs + inputs_.d_ext();
   const Real* e = signals.error.data();

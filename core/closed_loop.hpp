@@ -4,6 +4,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 
 #include "loop/input_layout.hpp"
 #include "loop/terms.hpp"
@@ -16,7 +17,7 @@ namespace mixed_order_game {
 /// What hosted players have of their own, at own entries, and what is computed from it alone.
 struct GainRows {
   explicit GainRows(const Shape& shape);
-  void refresh(const Shape& shape, const Gains& gains, const RbfNetwork& rbf);
+  void refresh(const Parameters& parameters);
 
   AlignedVector k;  ///< k1 (order 1) or k4 (order 2)
   AlignedVector k2;
@@ -27,6 +28,7 @@ struct GainRows {
   AlignedVector steepest;   ///< K delta^2 / epsilon, the largest slope of the robust term
   AlignedVector curvature;  ///< 4 / (3 sqrt 3) delta (K delta / epsilon)^2, the largest |phi''|
   AlignedVector W_max;
+  AlignedVector u_max;                     ///< empty where no control is bounded
   std::vector<Real> own_centers;           ///< as RbfNetwork's, of hosted players, where others are elsewhere
   AlignedVector sharpness_of_activations;  ///< 1 / rho^2, by player
 };
@@ -84,6 +86,15 @@ class ClosedLoop {
     const Real delta = gains_.delta[p];
     const Real tanh = delta != 0.0 ? phi / delta : 0.0;
     return gains_.steepest[p] * ((1.0 - tanh) * (1.0 + tanh));
+  }
+
+  /// u of own entry p before it is bounded, from what evaluate_seeking sets.
+  [[nodiscard]] Real wanted_control(std::size_t p, const Signals& signals) const {
+    return terms::control(gains_.k[p], signals.error[p], signals.network[p], signals.robust[p]);
+  }
+  /// Whether the bound takes its place.
+  [[nodiscard]] bool is_bounded(std::size_t p, const Signals& signals) const {
+    return !gains_.u_max.empty() && std::fabs(wanted_control(p, signals)) > gains_.u_max[p];
   }
 
   /// The part of the signals that every player computes from its own state and estimates: xbar, gradient, error,

@@ -1,5 +1,6 @@
 // Reads a game definition: every entry of the file is checked here, once, and trusted from here on.
 #include <algorithm>
+#include <limits>
 #include <set>
 
 #include "block_elimination.hpp"
@@ -186,8 +187,8 @@ void read_coefficients(const TomlEntry& table, int i, const Shape& shape, Coeffi
   }
 }
 
-constexpr std::string_view player_keys[] = {"name", "order", "gains", "rbf",  "x0",       "z0",         "v0",
-                                            "y0",   "W0",    "plant", "cost", "dynamics", "disturbance"};
+constexpr std::string_view player_keys[] = {"name", "order", "gains", "rbf",  "x0",       "z0",          "v0",
+                                            "y0",   "W0",    "plant", "cost", "dynamics", "disturbance", "u_max"};
 
 bool is_elsewhere(const TomlEntry& player) { return player["elsewhere"].present() && player["elsewhere"].boolean(); }
 
@@ -294,6 +295,17 @@ void read_weights(const TomlEntry& W0, int i, const Shape& shape, InitialState& 
   }
 }
 
+// One number or D, for the coordinates.
+void read_bound(const TomlEntry& bound, int i, const Shape& shape, std::vector<Real>& u_max) {
+  if (!bound.present()) return;
+  u_max.resize(at(shape.actions()), std::numeric_limits<Real>::infinity());
+  bound.numbers(shape.dimension, shape.players, &u_max[at(i)]);
+  for (int l = 0; l < shape.dimension; ++l) {
+    if (!(u_max[at(shape.entry(i, l))] > 0.0))
+      bound.fail("positive numbers, or no u_max where the control is not bounded");
+  }
+}
+
 bool is_x0(const TomlEntry& entry) {
   if (!entry.is_text()) return false;
   if (entry.text() != "x0") entry.fail("numbers, or \"x0\" for the initial actions");
@@ -328,7 +340,7 @@ void read_players(const TomlEntry& tables, const TomlEntry& defaults, Shape& sha
 
 /// What belongs to a plant, of a player whose plant is outside; keys that only the defaults have are for the others.
 void refuse_plant(const PlayerTable& player, int i) {
-  for (const std::string_view key : {"x0", "v0", "dynamics", "disturbance"}) {
+  for (const std::string_view key : {"x0", "v0", "dynamics", "disturbance", "u_max"}) {
     if (player.has_own(key)) {
       player[key].fail("no " + std::string(key) + " of player " + std::to_string(i + 1) + ", whose plant is external");
     }
@@ -433,12 +445,13 @@ std::int64_t variable_count(const Parameters& parameters) {
   const std::int64_t W0 = static_cast<std::int64_t>(parameters.initial.W.size());
   const std::int64_t initial_state = 2 * H * D + H * N * D + W0;  // x0, z0 or v0, y0
   const std::int64_t tolerances = 2;
+  const std::int64_t bounds = static_cast<std::int64_t>(parameters.bounded().size());
   const std::int64_t states = (2 + N + q) * H * D;         // x, z or v, y, W
   const std::int64_t signals = 6 * H * D + H;              // d_ext, u, x_star, W_norm2, phi, nn, cost
   const std::int64_t measures = 3 + 3 + H;                 // errors and gradient, solver work, order
   const std::int64_t from_others = (N - H) * (N + 3) * D;  // y, xbar, x and v
-  return gains + network + graph_and_cost + dynamics_and_disturbance + switches + initial_state + tolerances + states +
-         signals + measures + from_others;
+  return gains + network + graph_and_cost + dynamics_and_disturbance + switches + initial_state + tolerances + bounds +
+         states + signals + measures + from_others;
 }
 
 Expose read_expose(const TomlEntry& expose, const Parameters& parameters) {
@@ -516,6 +529,7 @@ Game parse_game(std::string_view toml, GameExpressions& texts) {
   PlayerExpressions dynamics_values = none;
   PlayerExpressions disturbance_values = none;
   Gains gains = read_gains(game["gains"], shape.players);
+  std::vector<Real> u_max;
   std::vector<Switching::OfPlayer> dynamics_graphs;
   std::vector<Switching::OfPlayer> disturbance_graphs;
   InitialState initial{.x = std::vector<Real>(at(n)),
@@ -532,6 +546,7 @@ Game parse_game(std::string_view toml, GameExpressions& texts) {
       refuse_plant(player, i);
       continue;
     }
+    read_bound(player["u_max"], i, shape, u_max);
     read_coefficients(player["dynamics"], i, shape, dynamics.coefficients);
     read_coefficients(player["disturbance"], i, shape, disturbance.coefficients);
     expressions.add_coordinates(player["dynamics"]["expression"], Purpose::dynamics, i, dynamics_values,
@@ -569,7 +584,8 @@ Game parse_game(std::string_view toml, GameExpressions& texts) {
                 .disturbance = family_of<Disturbance, ExpressionDisturbance>(
                     std::move(disturbance), !disturbance_values.empty(), disturbance_values, disturbance_switching),
                 .initial = std::move(initial),
-                .named = std::move(named)}};
+                .named = std::move(named),
+                .u_max = std::move(u_max)}};
   read.parameters.guess = read_guess(game["equilibrium"], shape, read.parameters.initial);
   read.expose = read_expose(game["expose"], read.parameters);
   read.parameters.refresh();

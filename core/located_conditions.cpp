@@ -19,6 +19,8 @@ constexpr int disturbance = 2;
 LocatedConditions::LocatedConditions(const ClosedLoop& loop)
     : loop_(loop),
       columns_(loop.shape().own_entries()),
+      bounded_(loop.parameters().bounded()),
+      first_bound_(count(loop.parameters()) - static_cast<int>(bounded_.size())),
       has_switches_(count(loop.parameters()) > columns_),
       signals_(loop.shape()),
       plants_(loop.shape()),
@@ -31,17 +33,22 @@ LocatedConditions::LocatedConditions(const ClosedLoop& loop)
 }
 
 int LocatedConditions::count(const Parameters& parameters) {
-  return parameters.first_switch(static_cast<int>(parameters.families().size()));
+  return parameters.first_switch(static_cast<int>(parameters.families().size())) +
+         static_cast<int>(parameters.bounded().size());
 }
 
 int LocatedConditions::located(const Parameters& parameters) {
   const auto families = parameters.families();
-  return std::accumulate(families.begin(), families.end(), parameters.shape.own_entries(),
+  const int others = parameters.shape.own_entries() + static_cast<int>(parameters.bounded().size());
+  return std::accumulate(families.begin(), families.end(), others,
                          [](int sum, const GameFamily* family) { return sum + family->switching().located(); });
 }
 
 bool LocatedConditions::can_hold(const Parameters& parameters, int k, Real value) {
   if (k < parameters.shape.own_entries()) return value == 0.0 || value == 1.0;
+  if (k >= parameters.first_switch(static_cast<int>(parameters.families().size()))) {
+    return value == -1.0 || value == 0.0 || value == 1.0;
+  }
   int f = disturbance;
   while (k < parameters.first_switch(f)) --f;
   return parameters.families()[at(f)]->switching().can_hold(k - parameters.first_switch(f), value);
@@ -85,6 +92,16 @@ void LocatedConditions::begin(Real t, const Real* state, const Real* inputs, Mod
     families[f].switching->own_values(leaves(static_cast<int>(f), t, state, inputs, modes), loop_.time_origin(), t,
                                       modes.data() + families[f].first);
   }
+  if (bounded_.empty()) return;
+  loop_.evaluate_seeking(state, inputs, modes, signals_);
+  for (std::size_t k = 0; k < bounded_.size(); ++k) {
+    modes[at(first_bound_) + k] = place_of_control(bounded_[k], signals_);
+  }
+}
+
+Real LocatedConditions::place_of_control(int p, const Signals& signals) const {
+  if (!loop_.is_bounded(at(p), signals)) return 0.0;
+  return loop_.wanted_control(at(p), signals) > 0.0 ? 1.0 : -1.0;
 }
 
 void LocatedConditions::event_functions(Real t, const Real* state, const Real* inputs, const Modes& modes,
@@ -101,6 +118,16 @@ void LocatedConditions::event_functions(Real t, const Real* state, const Real* i
       std::fill_n(values, switching->located(), -1.0);
     }
     values += switching->located();
+  }
+  if (bounded_.empty()) return;
+  loop_.evaluate_seeking(state, inputs, modes, signals);
+  for (std::size_t k = 0; k < bounded_.size(); ++k) {
+    constexpr Real almost_zero = 1e-100;  // integrators stop watching a function that begins at zero
+    const std::size_t p = at(bounded_[k]);
+    const Real u = loop_.wanted_control(p, signals) / loop_.gains().u_max[p];
+    const Real mode = modes[at(first_bound_) + k];
+    const Real value = mode == 0.0 ? std::fabs(u) - 1.0 : 1.0 - mode * u;
+    *values++ = value == 0.0 ? -almost_zero : value;
   }
 }
 
@@ -142,6 +169,26 @@ void LocatedConditions::pass_switches(Real t, const Real* state, const Real* inp
   }
 }
 
+/// Those that passed a bound, or all of them at a jump. Nothing jumps there.
+int LocatedConditions::pass_bounds(const Real* state, const Real* inputs, const int* passed, bool jumped,
+                                   Signals& signals, Modes& modes) const {
+  if (bounded_.empty()) return 0;
+  loop_.evaluate_seeking(state, inputs, modes, signals);
+  const int* flag = passed == nullptr ? nullptr : passed + located(loop_.parameters()) - bounded_.size();
+  int events = 0;
+  for (std::size_t k = 0; k < bounded_.size(); ++k) {
+    Real& mode = modes[at(first_bound_) + k];
+    const Real before = mode;
+    if (flag != nullptr && flag[k] != 0) {
+      mode = before != 0.0 ? 0.0 : loop_.wanted_control(at(bounded_[k]), signals) > 0.0 ? 1.0 : -1.0;
+    } else if (jumped) {
+      mode = place_of_control(bounded_[k], signals);
+    }
+    if (mode != before) ++events;
+  }
+  return events;
+}
+
 LocatedConditions::Change LocatedConditions::pass(Real t, const Real* state, const Real* inputs, Real tolerance,
                                                   const int* passed, Signals& signals, Modes& modes) const {
   std::copy(modes.begin(), modes.end(), before_.begin());
@@ -170,7 +217,10 @@ LocatedConditions::Change LocatedConditions::pass(Real t, const Real* state, con
       change.restarts =
           change.restarts || (modes[at(p)] != 0.0 && signals.error[at(p)] * signals.network[at(p)] >= 0.0);
     }
-    if (!jumped) return change;
+    if (!jumped) {
+      change.events += pass_bounds(state, inputs, passed, false, signals, modes);
+      return change;
+    }
   }
   loop_.event_functions(state, inputs, modes, tolerance, signals, values_.data());
   for (int p = 0; p < columns_; ++p) {
@@ -178,6 +228,7 @@ LocatedConditions::Change LocatedConditions::pass(Real t, const Real* state, con
     modes[at(p)] = modes[at(p)] == 0.0 ? 1.0 : 0.0;
     ++change.events;
   }
+  change.events += pass_bounds(state, inputs, passed, true, signals, modes);
   return change;
 }
 

@@ -1,6 +1,6 @@
-// All conditions on which the closed loop's equations depend: the projection's modes, one for each weight column, and
-// the switches of expressions. Each is held from one event to the next; located ones have an event function, those that
-// time alone changes have times that are known beforehand.
+// All conditions on which the closed loop's equations depend: the projection's modes, one for each weight column, the
+// switches of expressions, and the bounds of controls. Each is held from one event to the next; located ones have an
+// event function, those that time alone changes have times that are known beforehand.
 #pragma once
 
 #include <array>
@@ -17,9 +17,11 @@ class LocatedConditions {
   /// The loop must outlive it. The sizes follow from its game and never change.
   explicit LocatedConditions(const ClosedLoop& loop);
 
-  /// Number of modes: weight columns, then the switches of cost, dynamics and disturbance.
+  /// Number of modes: weight columns, then the switches of cost, dynamics and disturbance, then bounded controls, which
+  /// are at their bounds by -1 or 1 or between them by 0.
   [[nodiscard]] static int count(const Parameters& parameters);
-  /// Number of event functions: of weight columns, then of the switches that are located, in the same order.
+  /// Number of event functions: of weight columns, then of the switches that are located, then of bounded controls, in
+  /// the same order.
   [[nodiscard]] static int located(const Parameters& parameters);
   /// Whether a mode can have a value.
   [[nodiscard]] static bool can_hold(const Parameters& parameters, int k, Real value);
@@ -58,12 +60,18 @@ class LocatedConditions {
   [[nodiscard]] std::array<Family, 3> families() const;
   [[nodiscard]] LeafValues leaves(int family, Real t, const Real* state, const Real* inputs, const Modes& modes) const;
   [[nodiscard]] LeafValues leaves(Real t, const Modes& modes) const;
+  [[nodiscard]] int pass_bounds(const Real* state, const Real* inputs, const int* passed, bool jumped, Signals& signals,
+                                Modes& modes) const;
+  /// Where a control is that is bounded: -1, 0 or 1.
+  [[nodiscard]] Real place_of_control(int p, const Signals& signals) const;
   void pass_switches(Real t, const Real* state, const Real* inputs, const int* passed, Modes& modes) const;
   void refuse_sliding(Real t, const Real* state, const Real* inputs, const Modes& before, const Modes& after) const;
 
   const ClosedLoop& loop_;
   int columns_;
-  bool has_switches_;  // beside the columns
+  std::vector<int> bounded_;  // own entries
+  int first_bound_;           // mode
+  bool has_switches_;         // beside the columns
   mutable Signals signals_;
   mutable Signals plants_;  // for actions and velocities of all players
   std::vector<Real> inputs_at_rest_;

@@ -10,6 +10,7 @@ LoopJacobian::LoopJacobian(const ClosedLoop& loop)
       error(at(loop.shape().own_entries())),
       network(error.size()),
       slope(error.size()),
+      follows(error.size(), 1.0),
       inverse_bound(error.size()),
       loop_(&loop) {
   refresh();
@@ -38,6 +39,9 @@ void LoopJacobian::linearize(const Real* state, const Plants& plants, const Sign
   }
   std::copy(signals.error.begin(), signals.error.end(), error.begin());
   std::copy(signals.network.begin(), signals.network.end(), network.begin());
+  for (std::size_t p = 0; p < loop_->gains().u_max.size(); ++p) {
+    follows[p] = loop_->is_bounded(p, signals) ? 0.0 : 1.0;
+  }
   if (!parameters.strategy.robust) {
     std::fill(slope.begin(), slope.end(), 0.0);
     std::fill(inverse_bound.begin(), inverse_bound.end(), 0.0);

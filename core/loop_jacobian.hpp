@@ -24,6 +24,7 @@ class LoopJacobian {
   AlignedVector error;                 ///< e
   AlignedVector network;               ///< w'S
   AlignedVector slope;                 ///< d phi / d e
+  AlignedVector follows;               ///< 1 where u follows e and w'S, 0 where it is at its bound
   AlignedVector inverse_bound;         ///< 1 / W_max on the sphere while e w'S >= 0, else 0
   AlignedVector hessian;               ///< along Cost::hessian_pattern()
   AlignedVector dynamics;              ///< along UnknownDynamics::jacobian_pattern(); zero when not perturbed

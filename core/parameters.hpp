@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <vector>
 
 #include "cloned.hpp"
@@ -66,6 +67,7 @@ struct Parameters {
   InitialState initial;
   NamedParameters named = {};
   std::vector<Real> guess = {};  ///< where the search for the Nash equilibrium begins, entry(i, l)
+  std::vector<Real> u_max = {};  ///< bound of |u|, entry(i, l); infinite where there is none, empty: nowhere
 
   /// Whatever declares coefficients, in the order of the variables.
   [[nodiscard]] std::array<GameFamily*, 3> families() { return {&*cost, &*dynamics, &*disturbance}; }
@@ -77,8 +79,9 @@ struct Parameters {
     for (const auto member : Gains::members()) (zero.gains.*member).assign(at(shape.players), 0.0);
     zero.graph = CommunicationGraph(shape, graph.directed());
     for (GameFamily* family : zero.families()) family->coefficients.set_all_to_zero();
-    for (std::vector<Real>* values : {&zero.rbf.centers, &zero.rbf.width, &zero.rbf.W_max, &zero.initial.x,
-                                      &zero.initial.reference, &zero.initial.y, &zero.initial.W, &zero.named.values}) {
+    for (std::vector<Real>* values :
+         {&zero.rbf.centers, &zero.rbf.width, &zero.rbf.W_max, &zero.initial.x, &zero.initial.reference,
+          &zero.initial.y, &zero.initial.W, &zero.named.values, &zero.u_max}) {
       values->assign(values->size(), 0.0);
     }
     return zero;
@@ -89,6 +92,15 @@ struct Parameters {
     int first = shape.own_entries();
     for (int k = 0; k < f; ++k) first += families()[at(k)]->switching().count();
     return first;
+  }
+
+  /// Own entries whose controls are bounded, ascending.
+  [[nodiscard]] std::vector<int> bounded() const {
+    std::vector<int> entries;
+    for (int p = 0; p < (u_max.empty() ? 0 : shape.own_entries()); ++p) {
+      if (std::isfinite(u_max[at(shape.entry_of_own(p))])) entries.push_back(p);
+    }
+    return entries;
   }
 
   /// Throws GameError when named parameters have values with which a switch of an expression makes no sense.

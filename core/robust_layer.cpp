@@ -34,7 +34,8 @@ void RobustLayer::find_weights(const LoopJacobian& jacobian, Real gamma, const R
   kernels().largest_products(static_cast<int>(columns), loop_.shape().neurons, jacobian.activation.data(),
                              weight + layout.weights(), weight_.data());
   for (std::size_t p = 0; p < columns; ++p) {
-    weight_[p] = place_[p] < 0 ? 0.0 : std::max(weight[place_[p]], gamma * loop_.gains().beta[p] * weight_[p]);
+    const bool drives = place_[p] >= 0 && jacobian.follows[p] != 0.0;
+    weight_[p] = !drives ? 0.0 : std::max(weight[place_[p]], gamma * loop_.gains().beta[p] * weight_[p]);
   }
 }
 

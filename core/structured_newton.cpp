@@ -72,6 +72,7 @@ class StructuredNewton final : public NewtonSolver {
 
   // one solve
   AlignedVector network_rhs_;  // h
+  AlignedVector driving_rhs_;  // h where u follows w'S, else 0
   AlignedVector core_rhs_;
   AlignedVector shared_;    // dxbar, joint
   AlignedVector gradient_;  // Hessian rows times dy
@@ -124,7 +125,7 @@ void StructuredNewton::refresh(const LoopJacobian& jacobian) {
   const std::size_t n = at(n_);
   for (AlignedVector* vector : {&stiffness_, &inverse_driven_, &inverse_a2_, &inverse_a1_, &squares_, &network_gain_,
                                 &activation_per_error_, &weight_per_error_, &weight_per_network_, &network_rhs_,
-                                &gradient_, &error_change_, &from_error_, &onto_weight_}) {
+                                &driving_rhs_, &gradient_, &error_change_, &from_error_, &onto_weight_}) {
     vector->assign(n, 0.0);
   }
   for (AlignedVector* vector : {&shared_, &velocity_}) vector->assign(at(joint_), 0.0);
@@ -176,12 +177,16 @@ void StructuredNewton::refresh(const LoopJacobian& jacobian) {
 //     a1 = 1 + gamma beta e r,  a2 = 1 + 2 gamma beta e r,
 //     d(w'S) = S'dw = (S'b + gamma beta (|S|^2 - w'S r) de) / a2 = S'b / a2 + A de,
 //     A = gamma beta (|S|^2 - w'S r) / a2.
+// Where u is at its bound, the stiffness is 0 and w'S does not drive.
 void StructuredNewton::factor_weights() {
   const Parameters& parameters = loop().parameters();
   const GainRows& gains = loop().gains();
   const LoopJacobian& jacobian = *jacobian_;
   for (int p = 0; p < n_; ++p) stiffness_[at(p)] = gains.k[at(p)] + jacobian.slope[at(p)];
-  if (!parameters.strategy.robust) return;
+  const auto hold_bounded = [&] {
+    for (std::size_t p = 0; p < loop().gains().u_max.size(); ++p) stiffness_[p] *= jacobian.follows[p];
+  };
+  if (!parameters.strategy.robust) return hold_bounded();
 
   const Real* activation = jacobian.activation.data();
   kernels().column_products(n_, parameters.shape.neurons, activation, activation, squares_.data());
@@ -200,6 +205,7 @@ void StructuredNewton::factor_weights() {
     weight_per_error_[at(p)] = -gamma_beta * r * inverse_a1;
     weight_per_network_[at(p)] = -push * theta * inverse_a1;
   }
+  hold_bounded();
 }
 
 // Rows of the core system, B = stiffness, H the cost's Hessian rows, G the dynamics' Jacobian, T the gains of xbar:
@@ -293,6 +299,11 @@ void StructuredNewton::solve(Real* b) {
   } else {
     std::fill_n(h, n_, 0.0);
   }
+  const Real* driving = h;
+  if (!loop().gains().u_max.empty()) {
+    for (int p = 0; p < n_; ++p) driving_rhs_[at(p)] = jacobian_->follows[at(p)] * h[p];
+    driving = driving_rhs_.data();
+  }
 
   // core
   const auto along_velocities = [&](int p, const Real* dv) {
@@ -310,13 +321,13 @@ void StructuredNewton::solve(Real* b) {
   for (const int p : velocity_driven_) {
     core_rhs_[at(shared_place_[at(p)])] = b[reference_[at(p)]] - gamma_ * k2[at(p)] * gradient_[at(p)];
     if (plant_[at(p)] == 0) continue;
-    core_rhs_[at(action_place_[at(p)])] = b[x_[at(p)]] - gamma_ * h[p];
+    core_rhs_[at(action_place_[at(p)])] = b[x_[at(p)]] - gamma_ * driving[p];
     if (has_velocities) core_rhs_[at(action_place_[at(p)])] -= along_velocities(p, velocity_.data());
   }
   for (const int p : accelerated_) {
     if (plant_[at(p)] == 0) continue;
     const Real B = stiffness_[at(p)];
-    const Real known = h[p] + B * k2[at(p)] * gradient_[at(p)];
+    const Real known = driving[p] + B * k2[at(p)] * gradient_[at(p)];
     core_rhs_[at(shared_place_[at(p)])] =
         (1.0 + gamma_ * B) * b[x_[at(p)]] + gamma_ * (b[reference_[at(p)]] - gamma_ * known);
     if (has_velocities) core_rhs_[at(shared_place_[at(p)])] -= gamma_ * along_velocities(p, velocity_.data());
@@ -355,7 +366,7 @@ void StructuredNewton::solve(Real* b) {
       if (place >= 0) dg += jacobian_->dynamics[at(k)] * b[place];
     }
     if (has_velocities) dg += along_velocities(p, velocity_.data());
-    const Real push = h[p] + stiffness_[at(p)] * k2[at(p)] * gradient_[at(p)] - dg;
+    const Real push = driving[p] + stiffness_[at(p)] * k2[at(p)] * gradient_[at(p)] - dg;
     Real& dv = b[reference_[at(p)]];
     dv = (dv - gamma_ * push) * inverse_driven_[at(p)];
     error_change_[at(p)] = dv + k2[at(p)] * gradient_[at(p)];

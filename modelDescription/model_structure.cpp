@@ -192,6 +192,11 @@ class Analysis {
       numbers.centers.push_back(rbf.diagonal ? knowns_.parameter("center", first, rbf.centers[k])
                                              : Dependencies(rbf.centers[k]));
     }
+    for (std::size_t k = 0; k < parameters_.u_max.size(); ++k) {
+      const bool is_bounded = std::isfinite(parameters_.u_max[k]);
+      numbers.u_max.push_back(is_bounded ? knowns_.parameter("u_max", static_cast<int>(k), parameters_.u_max[k])
+                                         : Dependencies());
+    }
     for (int h = 0; h < shape_.hosts(); ++h) {
       const int i = shape_.host(h);
       auto& row = numbers.edges.emplace_back();

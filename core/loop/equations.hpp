@@ -19,6 +19,7 @@ struct LoopNumbers {
   Scalar robust, perturbed;
   std::vector<Scalar> width, W_max;      ///< by player
   std::vector<Scalar> centers;           ///< as in RbfNetwork
+  std::vector<Scalar> u_max;             ///< as in Parameters
   std::vector<std::vector<Edge>> edges;  ///< row h: a_ik of hosted player i = host(h)
   const CoefficientsAs<Scalar>* cost = nullptr;
   const CoefficientsAs<Scalar>* dynamics = nullptr;
@@ -130,6 +131,9 @@ void LoopEquations<Scalar>::evaluate_control(const LoopNumbers<Scalar>& number, 
     robust[at(p)] = number.robust * terms::robust_term(gains.delta[at(i)], gains.epsilon[at(i)], error[at(p)]);
     control[at(p)] =
         terms::control(second ? gains.k4[at(i)] : gains.k1[at(i)], error[at(p)], network[at(p)], robust[at(p)]);
+    if (!number.u_max.empty() && std::isfinite(parameters_.u_max[entry])) {
+      control[at(p)] = terms::within_bound(control[at(p)], number.u_max[entry]);
+    }
   }
 }
 

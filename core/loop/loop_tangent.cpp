@@ -20,6 +20,7 @@ LoopTangent::LoopTangent(const ClosedLoop& loop)
   numbers_.width.resize(at(loop.shape().players));
   numbers_.W_max.resize(at(loop.shape().players));
   numbers_.centers.resize(loop.parameters().rbf.centers.size());
+  numbers_.u_max.resize(loop.parameters().u_max.size());
   const NeighbourRows neighbours = loop.parameters().graph.neighbours();
   for (int h = 0; h < loop.shape().hosts(); ++h) {
     numbers_.edges.emplace_back().reserve(at(neighbours.start[h + 1] - neighbours.start[h]));
@@ -57,6 +58,9 @@ void LoopTangent::evaluate(const Parameters* direction, Real t, const Real* at_s
   set(numbers_.width, &Parameters::rbf, &RbfNetwork::width);
   set(numbers_.W_max, &Parameters::rbf, &RbfNetwork::W_max);
   set(numbers_.centers, &Parameters::rbf, &RbfNetwork::centers);
+  for (std::size_t k = 0; k < numbers_.u_max.size(); ++k) {
+    numbers_.u_max[k] = {parameters.u_max[k], direction == nullptr ? 0.0 : direction->u_max[k]};
+  }
   numbers_.robust = parameters.strategy.robust ? 1.0 : 0.0;
   numbers_.perturbed = parameters.strategy.perturbed ? 1.0 : 0.0;
   for (int h = 0; h < loop_->shape().hosts(); ++h) {

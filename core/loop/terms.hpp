@@ -7,6 +7,8 @@
 #include <cmath>
 #include <vector>
 
+#include "loop/dependencies.hpp"
+#include "loop/dual.hpp"
 #include "parameters.hpp"
 #include "signals.hpp"
 #include "state_layout.hpp"
@@ -55,6 +57,13 @@ template <typename Scalar>
 Scalar control(const Scalar& k, const Scalar& e, const Scalar& network, const Scalar& robust) {
   return -k * e - network - robust;
 }
+
+/// The control that reaches the plant: u within [-u_max, u_max].
+inline Real within_bound(Real u, Real u_max) { return u > u_max ? u_max : u < -u_max ? -u_max : u; }
+inline Dual within_bound(const Dual& u, const Dual& u_max) {
+  return u.value > u_max.value ? u_max : u.value < -u_max.value ? -u_max : u;
+}
+inline Dependencies within_bound(const Dependencies& u, const Dependencies& u_max) { return (u + u_max).nonlinear(); }
 
 /// w' = beta e (S - r w), with r = w'S / W_max on the sphere while e w'S >= 0, and 0 otherwise
 template <typename Scalar>

@@ -88,6 +88,7 @@ class ModelVariables::Builder {
          .read = [](const View& view, int) { return view.time; }},
         one());
     add_gains();
+    add_bounds();
     add_network();
     add_graph();
     add_coefficients();
@@ -343,6 +344,23 @@ class ModelVariables::Builder {
       };
       add(std::move(family), per_player ? players(gain.order) : one());
     }
+  }
+
+  void add_bounds() {
+    Elements bounded;
+    for (const int p : game_.parameters.bounded()) {
+      const int entry = shape_.entry_of_own(p);
+      bounded.push_back({entry, {shape_.player_of(entry) + 1, shape_.coordinate_of(entry) + 1}});
+    }
+    if (bounded.empty()) return;
+    std::sort(bounded.begin(), bounded.end(), [](const Element& a, const Element& b) { return a.index < b.index; });
+    Family family = parameter("u_max", "Bound of the control in either direction", Variability::tunable);
+    family.declared_type = "Drive";
+    family.unit = drive;
+    family.range = Range::positive;
+    family.read = [](const View& view, int slot) { return view.settings->parameters.u_max[at(slot)]; };
+    family.write = [](Settings& settings, int slot, Real value) { settings.parameters.u_max[at(slot)] = value; };
+    add(std::move(family), bounded);
   }
 
   void add_network() {

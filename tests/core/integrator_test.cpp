@@ -52,6 +52,17 @@ struct Simulation {
   Integrator integrator;
 };
 
+/// The paper's game with bounded controls.
+std::string bounded_game() {
+  std::string text = text_of(paper_game);
+  const std::string bound = "\nu_max = [150.0, 120.0]";
+  for (std::size_t at = text.find("\nx0 = "); at != std::string::npos; at = text.find("\nx0 = ", at)) {
+    text.insert(at, bound);
+    at += bound.size() + 1;
+  }
+  return text;
+}
+
 bool same_bits(const std::vector<Real>& a, const std::vector<Real>& b) {
   return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(Real)) == 0;
 }
@@ -104,8 +115,8 @@ TEST(Integrator, DoesNotDependOnCommunicationPoints) {
 
 TEST(Integrator, RestoresCheckpointsBitForBit) {
   const Tolerances tolerances{1e-6, 1e-8};
-  for (const std::string& game : {paper_game, busy_game, switching_game}) {
-    Simulation run(text_of(game));
+  for (const std::string& game : {text_of(paper_game), text_of(busy_game), text_of(switching_game), bounded_game()}) {
+    Simulation run(game);
     run.integrator.set_equilibrium(run.some_equilibrium());
     run.integrator.start(0.0, tolerances, {.errors_from = 0.3});
     std::vector<Checkpoint> checkpoints;
@@ -118,7 +129,7 @@ TEST(Integrator, RestoresCheckpointsBitForBit) {
       statistics.push_back(run.integrator.statistics());
     }
     for (const std::size_t from : {0U, 33U, 1U, 7U, 20U, 39U}) {
-      Simulation fresh(text_of(game));
+      Simulation fresh(game);
       for (Simulation* other : {&run, &fresh}) {
         EXPECT_TRUE(other->integrator.restore(checkpoints[from], tolerances)) << from;
         EXPECT_TRUE(same_bits(other->state(), states[from])) << from;
@@ -154,14 +165,16 @@ TEST(Integrator, ContinuesFromTheStoredStateWhenTheStepsLeadElsewhere) {
 }
 
 TEST(Integrator, StructuredAndDenseSolversGiveTheSameRun) {
-  for (const std::string& game : {paper_game, busy_game}) {
-    Simulation structured(text_of(game));
-    Simulation dense(text_of(game), make_dense_newton());
+  // the bends of bounded controls, which no restart meets, cost accuracy
+  for (const auto& [game, bound] :
+       {std::pair{text_of(paper_game), 1e-6}, {text_of(busy_game), 1e-6}, {bounded_game(), 5e-5}}) {
+    Simulation structured(game);
+    Simulation dense(game, make_dense_newton());
     for (Simulation* run : {&structured, &dense}) {
       run->integrator.start(0.0, {1e-9, 1e-11});
       run->integrator.advance(2.0);
       for (int p = 0; p < run->loop.shape().actions(); ++p) {
-        EXPECT_NEAR(run->integrator.state()[p], structured.integrator.state()[p], 1e-6);
+        EXPECT_NEAR(run->integrator.state()[p], structured.integrator.state()[p], bound);
       }
     }
   }

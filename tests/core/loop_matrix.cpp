@@ -48,8 +48,8 @@ std::vector<MatrixEntry> matrix_of(const LoopJacobian& jacobian) {
     for (int m = 0; m < shape.neurons; ++m) add(layout.weights_of(m) + p, scale * jacobian.activation[at(m * n + p)]);
   };
   const auto add_driven = [&](int p) {  // d(u + g)
-    add_error(p, -(gains.k[at(p)] + jacobian.slope[at(p)]));
-    if (robust) add_network(p, -1.0);
+    add_error(p, -jacobian.follows[at(p)] * (gains.k[at(p)] + jacobian.slope[at(p)]));
+    if (robust) add_network(p, -jacobian.follows[at(p)]);
     for (int k = dynamics_rows.start[at(p)]; k < dynamics_rows.start[at(p + 1)]; ++k) {
       add(layout.x() + dynamics_rows.column[at(k)], jacobian.dynamics[at(k)]);
     }

@@ -35,7 +35,8 @@ class Signals:
     e: Numbers  # (N, D), seeking error
     nn: Numbers  # (N, D), W_i^T S_i
     phi: Numbers  # (N, D), robust term; 0 when not robust
-    u: Numbers  # (N, D), control
+    u: Numbers  # (N, D), control within its bound
+    wanted: Numbers  # (N, D), control before it is bounded
 
 
 def unpack(game: Game, state: Numbers) -> Parts:
@@ -78,7 +79,7 @@ def signals(game: Game, state: Numbers) -> Signals:
             paper.plain_control_first_order(game.k1, s.x, s.p),
             paper.plain_control_second_order(game.k2, game.k4, gradient, s.p),
         )
-        return Signals(S, gradient, e, np.zeros_like(e), np.zeros_like(e), u)
+        return Signals(S, gradient, e, np.zeros_like(e), np.zeros_like(e), _within(u, game.u_max), u)
     nn = paper.network_output(s.W, S)
     phi = paper.robust_term(game.delta, game.epsilon, e)
     u = np.where(
@@ -86,7 +87,12 @@ def signals(game: Game, state: Numbers) -> Signals:
         paper.control_first_order(game.k1, s.x, s.p, nn, phi),
         paper.control_second_order(game.k2, game.k4, gradient, s.p, nn, phi),
     )
-    return Signals(S, gradient, e, nn, phi, u)
+    return Signals(S, gradient, e, nn, phi, _within(u, game.u_max), u)
+
+
+def _within(u: Numbers, u_max: FloatArray) -> Numbers:
+    """u within [-u_max, u_max]; a complex step leaves the bound where it is."""
+    return np.where(u.real > u_max, u_max, np.where(u.real < -u_max, -u_max, u))
 
 
 def _per_entry(value: Numbers | float) -> Any:

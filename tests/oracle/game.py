@@ -70,6 +70,7 @@ class Game:
     disturbance_frequency: FloatArray  # (N, D), rad/s
     disturbance_phase: FloatArray  # (N, D), rad
     disturbance_bias: FloatArray  # (N, D)
+    u_max: FloatArray  # (N, D), infinite where the control is not bounded
 
     @property
     def players(self) -> int:
@@ -123,6 +124,7 @@ def game_from_table(table: Table) -> Game:
     quadratic, constant, linear = np.zeros(N), np.zeros(N), np.zeros((N, D))
     coupling = np.zeros((N, N))
     dynamics = {name: np.zeros((N, N, D)) for name in ("linear", "square")}
+    u_max = np.full((N, D), np.inf)
     disturbance = {name: np.zeros((N, D)) for name in ("amplitude", "frequency", "phase", "bias")}
 
     for i, entry in enumerate(tables):
@@ -130,7 +132,7 @@ def game_from_table(table: Table) -> Game:
         player = _table(entry, where)
         order[i] = _integer(player.get("order"), 1, 2, f"{where}: order")
         own_start = "z0" if order[i] == 1 else "v0"
-        optional = {own_start, "gains", "rbf", "W0", "y0", "cost", "dynamics", "disturbance"}
+        optional = {own_start, "gains", "rbf", "W0", "y0", "cost", "dynamics", "disturbance", "u_max"}
         _check_keys(player, {"name", "order", "x0"}, optional, where)
         names.append(_text(player["name"], f"{where}: name"))
         for key in ("x0", own_start):
@@ -152,6 +154,9 @@ def game_from_table(table: Table) -> Game:
         for key, into in dynamics.items():
             for j, value in _indexed(terms.get(key, []), N, f"{where}: dynamics.{key}"):
                 into[i, j] = _per_coordinate(value, D, f"{where}: dynamics.{key}")
+
+        if "u_max" in player:
+            u_max[i] = _per_coordinate(player["u_max"], D, f"{where}: u_max")
 
         wave = _table(player.get("disturbance", {}), f"{where}: disturbance")
         _check_keys(wave, set(), set(disturbance), f"{where}: disturbance")
@@ -184,6 +189,7 @@ def game_from_table(table: Table) -> Game:
         disturbance_frequency=disturbance["frequency"],
         disturbance_phase=disturbance["phase"],
         disturbance_bias=disturbance["bias"],
+        u_max=u_max,
     )
 
 

@@ -25,7 +25,7 @@ Modes: TypeAlias = NDArray[np.bool_]  # (N, D), true on the sphere
 Breakpoint: TypeAlias = tuple[float, Mapping[str, ArrayLike]]
 
 TUNABLE = (
-    {*GAIN_NAMES, "adjacency", "dynamics_gain", "cost_quadratic", "cost_linear", "cost_coupling"}
+    {*GAIN_NAMES, "u_max", "adjacency", "dynamics_gain", "cost_quadratic", "cost_linear", "cost_coupling"}
     | {"disturbance_amplitude", "disturbance_frequency", "disturbance_phase", "disturbance_bias"}
 )  # fmt: skip
 LARGEST_SWITCHES = 10_000
@@ -59,6 +59,7 @@ class Trajectory:
     nash_error: FloatArray  # (T,), 2-norm of x - x*
     switches: tuple[Switch, ...]
     rate_evaluations: int
+    bound_passages: int  # how often a control came to its bound u_max or left it, not by a change of that
 
     @property
     def switch_count(self) -> int:
@@ -110,7 +111,11 @@ def simulate(
             run.change(changes)
     columns: dict[str, Any] = {name: np.array([row[name] for row in rows]) for name in rows[0]}
     return Trajectory(
-        t=samples, **columns, switches=tuple(run.switches), rate_evaluations=run.rate_evaluations
+        t=samples,
+        **columns,
+        switches=tuple(run.switches),
+        rate_evaluations=run.rate_evaluations,
+        bound_passages=run.bound_passages,
     )
 
 
@@ -130,6 +135,22 @@ class _Run:
         self.step: float | None = None
         self.switches: list[Switch] = []
         self.rate_evaluations = 0
+        self.bound_passages = 0
+        self.at_bound = self._at_bound(self.state)
+
+    def _at_bound(self, state: FloatArray) -> FloatArray:
+        """(N, D): -1 or 1 where the control is at its bound, else 0."""
+        wanted = signals(self.game, state).wanted
+        return np.where(np.abs(wanted) > self.game.u_max, np.sign(wanted), 0.0)
+
+    def _watch_bounds(self, start: float, interpolant: Callable[[float], FloatArray]) -> None:
+        """Count what happens from start to now, at sixteen times; the step error control meets the bends."""
+        if not np.isfinite(self.game.u_max).any():
+            return
+        for time in np.linspace(start, self.t, 17)[1:]:
+            at_bound = self._at_bound(interpolant(time))
+            self.bound_passages += int(np.abs(at_bound - self.at_bound).sum())
+            self.at_bound = at_bound
 
     def change(self, changes: Mapping[str, ArrayLike]) -> None:
         """Apply one breakpoint and give columns that the change pushes off the sphere their inside law."""
@@ -142,6 +163,7 @@ class _Run:
                 tuned: dict[str, Any] = {name: float(new) if isinstance(old, float) else new.copy()}
                 self.game = replace(self.game, **tuned)
         self.x_star = nash_equilibrium(self.game)
+        self.at_bound = self._at_bound(self.state)
         self._switch_where(self._violation(self.state) > 0.0)
 
     def sample(self) -> dict[str, Any]:
@@ -176,9 +198,11 @@ class _Run:
                 found = self._first_switch(solver)
                 if found is not None:
                     self.t, self.state, changing = found
+                    self._watch_bounds(solver.t_old, solver.dense_output())
                     self._switch_where(changing)
                     break
                 self.t, self.state = solver.t, solver.y
+                self._watch_bounds(solver.t_old, solver.dense_output())
         self._scale_to_sphere()
 
     def _solver(self, t: float, state: FloatArray, stop: float, step: float | None) -> Any:

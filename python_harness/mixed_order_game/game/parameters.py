@@ -53,6 +53,7 @@ class GameParameters:
     dynamics_linear: FloatArray  # (N, N, D), G_ij,l times dynamics_gain[i]
     dynamics_square: FloatArray  # (N, N, D), H_ij,l times dynamics_gain[i]
     disturbance_bound: FloatArray  # (N, D), |bias| + |amplitude|, at least max_t |d_il(t)|
+    u_max: FloatArray  # (N, D), bound of |u_il|; infinite where there is none
     expressions: Expressions  # which costs, dynamics and disturbances these coefficients are not all of
     x_star: FloatArray | None  # (N, D), of the FMU; needed where costs have expressions
     jacobian: FloatArray | None = None
@@ -149,6 +150,7 @@ def parameters_of(tables: Table) -> GameParameters:
         dynamics_linear=pairs("dynamics", "linear", D),
         dynamics_square=pairs("dynamics", "square", D),
         disturbance_bound=rows(lambda player: _bound(player.get("disturbance", {})), D),
+        u_max=rows(lambda player: player.get("u_max", math.inf), D),
         expressions=expressions_of(tables),
         x_star=None,
     )
@@ -178,6 +180,9 @@ def game_parameters(model: Model, changes: Mapping[str, Value] | None = None) ->
             own[i - 1] = values[variable.name]
         return own
 
+    u_max = np.full((N, D), math.inf)
+    for index, variable in model.indexed("u_max").items():
+        u_max[tuple(position - 1 for position in index)] = values[variable.name]
     edges = array("a", N, N)
     gain = array("dynamics_gain", N)[:, np.newaxis, np.newaxis]
     return replace(
@@ -201,6 +206,7 @@ def game_parameters(model: Model, changes: Mapping[str, Value] | None = None) ->
         dynamics_square=gain * of_file.dynamics_square,
         disturbance_bound=np.abs(array("disturbance_bias", N, D))
         + np.abs(array("disturbance_amplitude", N, D)),
+        u_max=u_max,
     )
 
 

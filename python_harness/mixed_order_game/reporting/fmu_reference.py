@@ -47,8 +47,9 @@ default of games of more than 20,000 variables, `y`, `y0` and `W` do not exist, 
 Where a player of the game file has `gains` of its own, the gains are `k1[i]` (players of order 1), `k4[i]`
 (order 2), `k2[i]`, `k3[i]`, `beta[i]`, `delta[i]` and `epsilon[i]`; where one has an `rbf` of its own,
 `W_max[i]`, `rho[i]` and `center[i,m]`. Where one has `W0`, there are fixed parameters `W0[i,m,l]`, judged
-against `W_max` when initialization ends. Of a directed graph all `a[i,j]`, i != j, are variables: the weight
-with which i hears j.
+against `W_max` when initialization ends. Where one has `u_max`, there are tunable parameters `u_max[i,l]`,
+and `u[i,l]` is the control within its bound. Of a directed graph all `a[i,j]`, i != j, are variables: the
+weight with which i hears j.
 
 A *fixed* parameter is set before the run, a *tunable* one also at any communication point.
 """

@@ -19,6 +19,7 @@ from ..results.result import Result
 from ..results.unknown_term import UNKNOWN, FloatArray, recorded_for_unknown_term
 from ..theory.linearized import linearized_loop
 from .claims.archive import archive_valid
+from .claims.control_bounds import control_bounds
 from .claims.early_end import Ended, run_or_end
 from .claims.equilibrium import nash_equilibrium_exists
 from .claims.explanation import explain
@@ -230,7 +231,11 @@ def _judged(
     return Validation(
         model=model,
         claims=tuple(claims),
-        notes=(*(explain(run, game) for run in _runs(observed)[:1]), *_notes(game)),
+        notes=(
+            *(explain(run, game) for run in _runs(observed)[:1]),
+            *control_bounds(robust if isinstance(robust, Result) else None, game),
+            *_notes(game),
+        ),
         robust=robust if isinstance(robust, Result) else None,
         plain=plain if isinstance(plain, Result) else None,
     )

@@ -39,7 +39,14 @@ def standing_assumptions(game: AnalysedGame, c: LoopConstants) -> list[Hypothesi
     if p.directed:
         path = "; directed, " + ("not strongly connected" if apart else "strongly connected")
         matrix = f"the symmetric part of {matrix}"
+    bounded = np.flatnonzero(np.isfinite(p.u_max).any(axis=1)) + 1
+    controls = Hypothesis(
+        "Controls without bounds",
+        holds=False,
+        figures=f"u_max of player {', '.join(map(str, bounded))}: the rest tells of runs below it",
+    )
     return [
+        *([controls] if bounded.size else []),
         Hypothesis(
             "Assumption 1: own gradients globally Lipschitz",
             holds=True,

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from ...game.definition import has_expressions
 from ...game.parameters import GameParameters
 from ...theory.spectrum import gradient_map, monotonicity_constant, nash_equilibrium
+from .control_bounds import at_bound
 from .perturbed_run import PerturbedRun
 from .seeking_error import bound_of_seeking_error
 
@@ -29,6 +30,8 @@ def explain(run: PerturbedRun, game: GameParameters) -> str:
     expression = has_expressions(game.expressions, "cost")
     if expression:
         return f"No bound explains the neighbourhood: {expression}, and the bound is for quadratic costs."
+    if at_bound(run.result.u[run.judged], game).any():
+        return "No bound explains the neighbourhood: a control is at u_max, where it does not follow e."
     m = monotonicity_constant(game)
     if m <= 0.0:
         return (
