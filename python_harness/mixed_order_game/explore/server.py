@@ -155,7 +155,7 @@ class Asked(Guarded):
             raise HTTPError(400, reason="The body is not JSON") from None
         try:
             answer = await self.answer(wish_of(data, self.worker.model), *arguments)
-        except Superseded:
+        except (Superseded, asyncio.CancelledError):  # the page asks no more, or the server ends
             return
         except MixedOrderGameError as error:
             answer = self.refusal(str(error))

@@ -1,7 +1,10 @@
-"""What is worked out for the page, each kind in a thread of its own, given up when nobody waits for it."""
+"""What is worked out for the page beside its server, and given up when nobody waits for it."""
 
 import asyncio
+import json
+import sys
 import threading
+from asyncio.subprocess import PIPE
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any, TypeVar
@@ -10,7 +13,6 @@ from ..errors import MixedOrderGameError
 from ..files.temporary import temporary_folder
 from ..fmu.run import Simulator
 from ..fmu.schedule import write_disturbance
-from ..studies.validate import validate
 from .facts import facts_of
 from .game_file import changed_game
 from .picture import picture_of
@@ -18,7 +20,9 @@ from .spectrum import spectrum_of
 from .wish import Wish, WishError
 
 Answer = TypeVar("Answer")
-Stale = Callable[[], bool]
+
+ASKED = 0.2
+"""Seconds between two looks whether anybody still waits for the claims."""
 
 
 class Superseded(Exception):  # noqa: N818 - nothing went wrong
@@ -31,7 +35,7 @@ class Worker:
     def __init__(self, simulator: Simulator, name: str) -> None:
         self.simulator, self.model = simulator, simulator.model
         self.facts = facts_of(self.model, name)
-        self._threads = {kind: ThreadPoolExecutor(1, kind) for kind in ("run", "spectrum", "claims")}
+        self._threads = {kind: ThreadPoolExecutor(1, kind) for kind in ("run", "others")}
         self._closing = threading.Event()
 
     def close(self) -> None:
@@ -49,20 +53,33 @@ class Worker:
     async def spectrum(self, wish: Wish, gone: threading.Event) -> dict[str, Any]:
         """Eigenvalues, verdict and reason."""
         return await self._in_thread(
-            "spectrum", gone, lambda _: spectrum_of(self.simulator, wish.changes).as_json()
+            "others", gone, lambda _: spectrum_of(self.simulator, wish.changes).as_json()
         )
 
     async def claims(self, wish: Wish, gone: threading.Event) -> dict[str, Any]:
-        """The claims about the game with these values. Raises MixedOrderGameError."""
+        """What mog validate --json tells of the game with these values. Raises MixedOrderGameError.
 
-        def judge(go_on: Callable[[], None]) -> dict[str, Any]:
-            with temporary_folder(MixedOrderGameError) as folder:
-                fmu = changed_game(self.model, wish.changes).build(folder / "game.fmu")
-                found = validate(fmu, progress=lambda _name, _part: go_on())
-            told = found.as_json()
-            return {"summary": found.summary(), "claims": told["claims"], "notes": told["notes"]}
-
-        return await self._in_thread("claims", gone, judge)
+        It is a process of its own, as only that can be ended at any moment: large games take minutes.
+        """
+        with temporary_folder(MixedOrderGameError) as folder:
+            fmu = folder / "game.fmu"
+            fmu.write_bytes(await self.file(".fmu", wish, gone))
+            command = [sys.executable, "-m", __package__.partition(".")[0], "validate", str(fmu), "--json"]
+            process = await asyncio.create_subprocess_exec(*command, stdout=PIPE, stderr=PIPE)
+            try:
+                judged = asyncio.ensure_future(process.communicate())
+                while not (await asyncio.wait({judged}, timeout=ASKED))[0]:
+                    if gone.is_set():
+                        raise Superseded
+                told, said = judged.result()
+            finally:
+                if process.returncode is None:
+                    process.kill()
+                    await process.wait()
+        if not told:
+            raise MixedOrderGameError(said.decode().strip().removeprefix("mog: "))
+        answer: dict[str, Any] = json.loads(told)
+        return answer
 
     async def file(self, suffix: str, wish: Wish, gone: threading.Event) -> bytes:
         """The game (.toml), its FMU (.fmu) or the pushes (.csv). Raises MixedOrderGameError."""
@@ -78,7 +95,7 @@ class Worker:
                     raise WishError("there are no pushes")
                 return write_disturbance(folder / "pushes.csv", pushes.time, pushes.values).read_bytes()
 
-        return await self._in_thread("spectrum", gone, write)
+        return await self._in_thread("others", gone, write)
 
     async def _in_thread(
         self, kind: str, gone: threading.Event, work: Callable[[Callable[[], None]], Answer]

@@ -140,6 +140,7 @@ class Validation:
             "guid": self.model.guid,
             "passed": self.passed,
             "holds": self.holds,
+            "summary": self.summary(),
             "claims": [plain(claim) for claim in self.claims],
             "notes": list(self.notes),
         }
