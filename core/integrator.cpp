@@ -7,7 +7,6 @@
 #include <cstdlib>
 #include <cstring>
 #include <exception>
-#include <limits>
 #include <string>
 #include <utility>
 
@@ -458,7 +457,6 @@ void Integrator::Implementation::follow_change(Real t_end) {
   Real t = restart_time_;
   Real h = first_step_ > 0.0 ? first_step_ : 0.1 * (t_end - t);
   Statistics work;
-  constexpr Real epsilon = std::numeric_limits<Real>::epsilon();
   bool knows_rate = false;  // at t
   for (int tried = 0; t < t_end && tried < most_rosenbrock_steps; ++tried) {
     const Real left = t_end - t;
@@ -467,7 +465,7 @@ void Integrator::Implementation::follow_change(Real t_end) {
     if (!(t + step > t)) break;
     kernels().error_weights(size_, tolerances_.relative, tolerances_.absolute, restart_state_.data(), weight_.data());
     Real error = 0.0;
-    const Real resolution = epsilon * std::fabs(loop_.time_origin() + t);
+    const Real resolution = loop_.parameters().disturbance->resolution(t);
     const int result =
         rosenbrock_.step(t, step, resolution, restart_state_.data(), weight_.data(), next_state_.data(), error);
     if (failure_) std::rethrow_exception(std::exchange(failure_, nullptr));

@@ -1,6 +1,8 @@
 // External disturbances d_i of the plants, as the closed loop sees them: functions of absolute time.
 #pragma once
 
+#include <cmath>
+#include <limits>
 #include <memory>
 
 #include "families/game_family.hpp"
@@ -24,6 +26,9 @@ class Disturbance : public GameFamily {
                       const Real* held = nullptr) const = 0;
   virtual void values(const CoefficientsAs<Dependencies>& coefficients, const Dependencies& t,
                       Dependencies* d) const = 0;
+
+  /// The least change of t that values() sees.
+  [[nodiscard]] virtual Real resolution(Real t) const { return std::numeric_limits<Real>::epsilon() * std::fabs(t); }
 };
 
 }  // namespace mixed_order_game

@@ -22,6 +22,8 @@ class ExpressionDisturbance final : public SinusoidalDisturbance {
   void values(const CoefficientsAs<Dual>& along, const Dual& t, Dual* d, const Real* held = nullptr) const override;
   void values(const CoefficientsAs<Dependencies>& of, const Dependencies& t, Dependencies* d) const override;
 
+  /// Texts see the absolute time.
+  [[nodiscard]] Real resolution(Real t) const override { return SinusoidalDisturbance::resolution(time_origin + t); }
   [[nodiscard]] const Switching& switching() const override { return switching_; }
 
  private:
