@@ -3,12 +3,12 @@
 #include <cmath>
 #include <map>
 
-#include "box_constants.hpp"
+#include "definition/toml_reader.hpp"
+#include "equilibrium/box_constants.hpp"
 #include "errors.hpp"
 #include "json_text.hpp"
 #include "model.hpp"
 #include "settings.hpp"
-#include "toml_reader.hpp"
 
 namespace mixed_order_game {
 

@@ -3,8 +3,8 @@
 #include <map>
 #include <utility>
 
+#include "definition/toml_reader.hpp"
 #include "json_text.hpp"
-#include "toml_reader.hpp"
 
 namespace mixed_order_game {
 

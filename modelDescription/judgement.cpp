@@ -1,8 +1,8 @@
 #include "judgement.hpp"
 
-#include "equilibrium_verdict.hpp"
+#include "equilibrium/equilibrium_verdict.hpp"
 #include "errors.hpp"
-#include "game.hpp"
+#include "game/game.hpp"
 #include "json_text.hpp"
 
 namespace mixed_order_game {

@@ -3,8 +3,8 @@
 
 #include <vector>
 
-#include "loop/dependencies.hpp"
 #include "model.hpp"
+#include "numbers/dependencies.hpp"
 
 namespace mixed_order_game {
 

@@ -4,10 +4,10 @@
 #include <memory>
 #include <optional>
 
+#include "definition/toml_reader.hpp"
 #include "expression/player_expressions.hpp"
 #include "expression/unroll.hpp"
 #include "families/expression_cost.hpp"
-#include "toml_reader.hpp"
 
 namespace mixed_order_game {
 

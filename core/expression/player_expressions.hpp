@@ -8,7 +8,7 @@
 #include "expression/tape.hpp"
 #include "families/coefficients.hpp"
 #include "families/sparse_rows.hpp"
-#include "loop/dependencies.hpp"
+#include "numbers/dependencies.hpp"
 
 namespace mixed_order_game {
 

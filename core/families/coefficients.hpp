@@ -10,7 +10,7 @@
 #include <span>
 #include <vector>
 
-#include "loop/dual.hpp"
+#include "numbers/dual.hpp"
 #include "types.hpp"
 
 namespace mixed_order_game {

@@ -6,8 +6,8 @@
 
 #include "families/game_family.hpp"
 #include "families/sparse_rows.hpp"
-#include "loop/dependencies.hpp"
-#include "loop/dual.hpp"
+#include "numbers/dependencies.hpp"
+#include "numbers/dual.hpp"
 
 namespace mixed_order_game {
 

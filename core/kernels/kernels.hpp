@@ -33,7 +33,7 @@ constexpr int tile_length = 8;
 constexpr int full_step = 4;
 
 /// All estimate blocks by their eigenvectors; see EstimateBlocks. Entries lie in rows of n = N D.
-struct BlockModes {
+struct BlockEigenvectors {
   int players;  ///< in each block: the hosted ones
   int blocks;   ///< one for each player
   int n;
@@ -42,7 +42,7 @@ struct BlockModes {
   const double* shared;      ///< row k: product of the k-th eigenvectors with a_.j
 };
 /// More would not pay, see EstimateBlocks.
-constexpr int most_players_by_modes = 8;
+constexpr int most_players_by_eigenvectors = 8;
 
 struct Kernels {
   const char* level;  ///< name of the instruction set
@@ -92,9 +92,9 @@ struct Kernels {
   void (*solve_directed_blocks)(BlockPattern pattern, int width, const double* lower, const double* upper,
                                 const double* inverse_diagonal, double* rhs);
   /// inverse (H rows of n) = 1 / (1 + gamma k3 eigenvalue); gain[i * N + j] as in EstimateBlocks.
-  void (*factor_modes)(BlockModes modes, double gamma_k3, double* inverse, double* gain);
+  void (*factor_by_eigenvectors)(BlockEigenvectors eigenvectors, double gamma_k3, double* inverse, double* gain);
   /// Solves all blocks, in place: H rows of n.
-  void (*solve_modes)(BlockModes modes, const double* inverse, double* rhs);
+  void (*solve_by_eigenvectors)(BlockEigenvectors eigenvectors, const double* inverse, double* rhs);
   /// dy_ij = dy_ij + gain_ij dxbar_j
   void (*add_shared_signal)(int rows, int players, int dimension, const double* gain, const double* shared, double* y);
   /// rhs = scale rhs + from_error S + onto_weight W, row by row; coefficients per column.

@@ -29,7 +29,7 @@ namespace {
 #include "full_columns.ipp"
 #include "estimate_blocks.ipp"
 #include "directed_blocks.ipp"
-#include "estimate_modes.ipp"
+#include "estimate_eigenvectors.ipp"
 #include "vector_operations.ipp"
 #include "nordsieck.ipp"
 #include "tape.ipp"
@@ -54,8 +54,8 @@ const Kernels MIXED_ORDER_GAME_JOIN(kernels_, MIXED_ORDER_GAME_LEVEL) = {
     solve_blocks,
     factor_directed_blocks,
     solve_directed_blocks,
-    factor_modes,
-    solve_modes,
+    factor_by_eigenvectors,
+    solve_by_eigenvectors,
     add_shared_signal,
     weight_corrections,
     linear_sum,

@@ -8,7 +8,7 @@
 
 #include <vector>
 
-#include "parameters.hpp"
+#include "game/parameters.hpp"
 
 namespace mixed_order_game {
 

@@ -3,7 +3,7 @@
 #pragma once
 
 #include "aligned_vector.hpp"
-#include "closed_loop.hpp"
+#include "loop/closed_loop.hpp"
 #include "loop/equations.hpp"
 
 namespace mixed_order_game {

@@ -7,11 +7,11 @@
 #include <cmath>
 #include <vector>
 
-#include "loop/dependencies.hpp"
-#include "loop/dual.hpp"
-#include "parameters.hpp"
-#include "signals.hpp"
-#include "state_layout.hpp"
+#include "game/parameters.hpp"
+#include "loop/signals.hpp"
+#include "loop/state_layout.hpp"
+#include "numbers/dependencies.hpp"
+#include "numbers/dual.hpp"
 
 namespace mixed_order_game {
 

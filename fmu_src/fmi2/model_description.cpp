@@ -4,8 +4,8 @@
 #include <set>
 #include <sstream>
 
-#include "located_conditions.hpp"
 #include "logger.hpp"
+#include "loop/located_conditions.hpp"
 #include "model_structure.hpp"
 
 namespace mixed_order_game {

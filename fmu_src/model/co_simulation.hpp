@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "evaluation.hpp"
-#include "integrator.hpp"
+#include "integration/integrator.hpp"
 
 namespace mixed_order_game {
 

@@ -2,7 +2,7 @@
 
 #include <cstring>
 
-#include "equilibrium.hpp"
+#include "equilibrium/equilibrium.hpp"
 
 namespace mixed_order_game {
 

@@ -3,9 +3,9 @@
 
 #include <span>
 
-#include "closed_loop.hpp"
-#include "located_conditions.hpp"
+#include "loop/closed_loop.hpp"
 #include "loop/inputs.hpp"
+#include "loop/located_conditions.hpp"
 #include "settings.hpp"
 
 namespace mixed_order_game {

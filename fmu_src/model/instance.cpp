@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "block_elimination.hpp"
-#include "failure.hpp"
+#include "loop/failure.hpp"
+#include "newton/block_elimination.hpp"
 
 namespace mixed_order_game {
 

@@ -4,7 +4,7 @@
 #include <string>
 #include <string_view>
 
-#include "game.hpp"
+#include "game/game.hpp"
 #include "model_variables.hpp"
 
 namespace mixed_order_game {

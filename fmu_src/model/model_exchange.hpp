@@ -6,7 +6,7 @@
 #include <span>
 
 #include "evaluation.hpp"
-#include "judge.hpp"
+#include "integration/judge.hpp"
 
 namespace mixed_order_game {
 

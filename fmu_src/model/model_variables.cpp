@@ -8,7 +8,7 @@
 #include <set>
 
 #include "errors.hpp"
-#include "measures.hpp"
+#include "loop/measures.hpp"
 
 namespace mixed_order_game {
 

@@ -1,9 +1,9 @@
 // Everything that an importer sets (parameters, tolerances, inputs) and everything that it can read besides.
 #pragma once
 
-#include "closed_loop.hpp"
-#include "game.hpp"
-#include "integrator.hpp"
+#include "game/game.hpp"
+#include "integration/integrator.hpp"
+#include "loop/closed_loop.hpp"
 #include "loop/inputs.hpp"
 
 namespace mixed_order_game {

@@ -10,8 +10,8 @@
 #include <stdexcept>
 #include <string>
 
-#include "game.hpp"
-#include "integrator.hpp"
+#include "game/game.hpp"
+#include "integration/integrator.hpp"
 #include "kernels/kernels.hpp"
 #include "klu_newton.hpp"
 

@@ -16,8 +16,8 @@
 #include <stdexcept>
 #include <string>
 
-#include "game.hpp"
-#include "integrator.hpp"
+#include "game/game.hpp"
+#include "integration/integrator.hpp"
 
 namespace mixed_order_game {
 namespace {

@@ -2,7 +2,7 @@
 // licence is the LGPL, so it serves benchmarks and tests and is no part of the product.
 #pragma once
 
-#include "newton_solver.hpp"
+#include "newton/newton_solver.hpp"
 
 namespace mixed_order_game {
 

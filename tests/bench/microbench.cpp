@@ -12,12 +12,12 @@
 #include <stdexcept>
 #include <string>
 
-#include "game.hpp"
-#include "integrator.hpp"
+#include "game/game.hpp"
+#include "integration/integrator.hpp"
 #include "kernels/kernels.hpp"
 #include "loop/inputs.hpp"
-#include "loop_jacobian.hpp"
-#include "newton_solver.hpp"
+#include "loop/loop_jacobian.hpp"
+#include "newton/newton_solver.hpp"
 
 namespace mixed_order_game {
 namespace {

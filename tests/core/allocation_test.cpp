@@ -4,8 +4,8 @@
 #include <atomic>
 #include <cstdlib>
 
-#include "game.hpp"
-#include "integrator.hpp"
+#include "game/game.hpp"
+#include "integration/integrator.hpp"
 #include "loop/loop_tangent.hpp"
 #include "random_game.hpp"
 

@@ -1,4 +1,4 @@
-#include "block_elimination.hpp"
+#include "newton/block_elimination.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,10 +1,10 @@
-#include "closed_loop.hpp"
+#include "loop/closed_loop.hpp"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 
-#include "game.hpp"
+#include "game/game.hpp"
 #include "reference_loop.hpp"
 
 namespace mixed_order_game {

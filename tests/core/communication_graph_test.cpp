@@ -1,4 +1,4 @@
-#include "communication_graph.hpp"
+#include "game/communication_graph.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "equilibrium.hpp"
+#include "equilibrium/equilibrium.hpp"
 
 #include <gtest/gtest.h>
 #include <pthread.h>
@@ -10,7 +10,7 @@
 
 #include "errors.hpp"
 #include "families/quadratic_cost.hpp"
-#include "game.hpp"
+#include "game/game.hpp"
 #include "random_game.hpp"
 
 namespace mixed_order_game {

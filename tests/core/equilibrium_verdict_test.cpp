@@ -1,13 +1,13 @@
-#include "equilibrium_verdict.hpp"
+#include "equilibrium/equilibrium_verdict.hpp"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <limits>
 
+#include "equilibrium/hessian_bounds.hpp"
 #include "errors.hpp"
-#include "game.hpp"
-#include "hessian_bounds.hpp"
+#include "game/game.hpp"
 
 namespace mixed_order_game {
 namespace {

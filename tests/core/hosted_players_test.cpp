@@ -5,13 +5,13 @@
 #include <Eigen/Dense>
 #include <map>
 
-#include "equilibrium.hpp"
+#include "equilibrium/equilibrium.hpp"
 #include "errors.hpp"
-#include "failure.hpp"
-#include "game.hpp"
+#include "game/game.hpp"
+#include "loop/failure.hpp"
 #include "loop/loop_tangent.hpp"
 #include "loop_matrix.hpp"
-#include "newton_solver.hpp"
+#include "newton/newton_solver.hpp"
 #include "reference_loop.hpp"
 
 namespace mixed_order_game {

@@ -1,4 +1,4 @@
-#include "integrator.hpp"
+#include "integration/integrator.hpp"
 
 #include <gtest/gtest.h>
 
@@ -7,9 +7,9 @@
 #include <fstream>
 #include <sstream>
 
-#include "equilibrium.hpp"
+#include "equilibrium/equilibrium.hpp"
 #include "errors.hpp"
-#include "game.hpp"
+#include "game/game.hpp"
 #include "loop_matrix.hpp"
 #include "random_game.hpp"
 

@@ -7,7 +7,7 @@
 #include <limits>
 #include <memory>
 
-#include "block_elimination.hpp"
+#include "newton/block_elimination.hpp"
 #include "random_game.hpp"
 
 namespace mixed_order_game {
@@ -545,22 +545,22 @@ TEST(Blocks, AreFactoredAndSolvedSideBySide) {
 TEST(Blocks, AreSolvedByTheirModes) {
   RandomNumbers random(16);
   for (const auto& [N, dimension, neurons] : loop_sizes) {
-    if (N > most_players_by_modes) continue;
+    if (N > most_players_by_eigenvectors) continue;
     const int n = N * dimension;
     const Array vector(N * N * n, random), eigenvalue(N * n, random, 0.0, 9.0), shared(N * n, random),
         rhs(N * n, random);
-    const BlockModes modes{N, N, n, vector, eigenvalue, shared};
+    const BlockEigenvectors modes{N, N, n, vector, eigenvalue, shared};
     constexpr double gamma_k3 = 0.7;
     Array inverse(N * n);
     for (int k = 0; k < N * n; ++k) inverse[k] = 1.0 / (1.0 + gamma_k3 * eigenvalue[k]);
     const Array factors = on_every_level([&](const Kernels& kernel) {
       Array all(N * n + N * N, 9.0);
-      kernel.factor_modes(modes, gamma_k3, all, all + N * n);
+      kernel.factor_by_eigenvectors(modes, gamma_k3, all, all + N * n);
       return all;
     });
     const Array solution = on_every_level([&](const Kernels& kernel) {
       Array x(rhs);
-      kernel.solve_modes(modes, inverse, x);
+      kernel.solve_by_eigenvectors(modes, inverse, x);
       return x;
     });
     const auto sum_of_modes = [&](int i, int p, auto coefficient) {

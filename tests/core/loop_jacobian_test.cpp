@@ -1,9 +1,9 @@
-#include "loop_jacobian.hpp"
+#include "loop/loop_jacobian.hpp"
 
 #include <gtest/gtest.h>
 
 #include "families/quadratic_cost.hpp"
-#include "game.hpp"
+#include "game/game.hpp"
 #include "loop_matrix.hpp"
 #include "reference_loop.hpp"
 

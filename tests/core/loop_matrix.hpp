@@ -5,7 +5,7 @@
 #include <memory>
 #include <vector>
 
-#include "newton_solver.hpp"
+#include "newton/newton_solver.hpp"
 
 namespace mixed_order_game {
 

@@ -7,7 +7,7 @@
 #include "families/polynomial_dynamics.hpp"
 #include "families/quadratic_cost.hpp"
 #include "families/sinusoidal_disturbance.hpp"
-#include "game.hpp"
+#include "game/game.hpp"
 #include "reference_loop.hpp"
 
 namespace mixed_order_game {

@@ -1,10 +1,10 @@
-#include "measures.hpp"
+#include "loop/measures.hpp"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "game.hpp"
+#include "game/game.hpp"
 #include "reference_loop.hpp"
 
 namespace mixed_order_game {

@@ -1,11 +1,11 @@
-#include "newton_solver.hpp"
+#include "newton/newton_solver.hpp"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
 #include "families/quadratic_cost.hpp"
-#include "game.hpp"
+#include "game/game.hpp"
 #include "loop_matrix.hpp"
 #include "random_game.hpp"
 
@@ -93,7 +93,7 @@ INSTANTIATE_TEST_SUITE_P(AssortedGames, StructuredNewton, ::testing::ValuesIn(as
 // too many players for the modes of the estimate blocks
 INSTANTIATE_TEST_SUITE_P(
     ManyPlayers, StructuredNewton,
-    ::testing::Values(Recipe{.seed = 12, .players = most_players_by_modes + 1, .dimension = 1, .neurons = 3},
+    ::testing::Values(Recipe{.seed = 12, .players = most_players_by_eigenvectors + 1, .dimension = 1, .neurons = 3},
                       Recipe{.seed = 13, .players = 19, .dimension = 2, .neurons = 2, .diagonal = false}));
 
 class StructuredNewtonOnGraphs : public ::testing::TestWithParam<std::size_t> {};

@@ -1,12 +1,12 @@
-#include "nordsieck_prediction.hpp"
+#include "integration/nordsieck_prediction.hpp"
 
 #include <gtest/gtest.h>
 #include <nvector/nvector_serial.h>
 
 #include <bit>
 
+#include "integration/sundials_handles.hpp"
 #include "random_game.hpp"
-#include "sundials_handles.hpp"
 
 namespace mixed_order_game {
 namespace {

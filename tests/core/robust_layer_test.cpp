@@ -1,11 +1,11 @@
-#include "robust_layer.hpp"
+#include "newton/robust_layer.hpp"
 
 #include <gtest/gtest.h>
 
 #include <array>
 #include <cmath>
 
-#include "game.hpp"
+#include "game/game.hpp"
 #include "reference_loop.hpp"
 
 namespace mixed_order_game {

@@ -1,4 +1,4 @@
-#include "rosenbrock_method.hpp"
+#include "integration/rosenbrock_method.hpp"
 
 #include <gtest/gtest.h>
 

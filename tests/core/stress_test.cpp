@@ -6,8 +6,8 @@
 #include <cstdlib>
 
 #include "errors.hpp"
-#include "game.hpp"
-#include "integrator.hpp"
+#include "game/game.hpp"
+#include "integration/integrator.hpp"
 #include "random_game.hpp"
 
 namespace mixed_order_game {

@@ -1,4 +1,4 @@
-#include "sundials_newton_iteration.hpp"
+#include "integration/sundials_newton_iteration.hpp"
 
 #include <cvode/cvode.h>
 #include <gtest/gtest.h>
