@@ -1,5 +1,5 @@
-// A small FMI 2.0 host that runs where the library runs: simulates the model to t = 20 s, saves and restores it half-way,
-// and prints what it saw, so that platforms can be compared number by number.
+// A small FMI 2.0 host that runs where the library runs: simulates the model to t = 20 s, saves and restores it
+// half-way, and prints what it saw, so that platforms can be compared number by number.
 //
 // usage: host LIBRARY GUID RESOURCE-URI RUNS REFERENCE...
 //   point T VALUE...           each communication point
@@ -8,7 +8,6 @@
 //   deserialized yes|no        the same in another instance from the state's bytes
 //   seconds S                  shortest of RUNS simulations
 #include <fmi2FunctionTypes.h>
-
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -23,17 +22,42 @@
 enum { points = 200, half = points / 2 };
 static const double step = 0.1;  // s
 
-static void* function(const char* library, const char* name) {
 #ifdef _WIN32
-  HMODULE module = LoadLibraryA(library);
-  void* const address = module == NULL ? NULL : (void*)GetProcAddress(module, name);
+static HMODULE module;
 #else
-  void* const module = dlopen(library, RTLD_NOW | RTLD_LOCAL);
-  void* const address = module == NULL ? NULL : dlsym(module, name);
-  if (address == NULL) fprintf(stderr, "host: %s\n", dlerror());
+static void* module;
+#endif
+
+static void load(const char* library) {
+#ifdef _WIN32
+  module = LoadLibraryA(library);
+#else
+  module = dlopen(library, RTLD_NOW | RTLD_LOCAL);
+  if (module == NULL) fprintf(stderr, "host: %s\n", dlerror());
+#endif
+  if (module == NULL) {
+    fprintf(stderr, "host: %s cannot be loaded\n", library);
+    exit(1);
+  }
+}
+
+/// What the library has for the end of the process must have run by now.
+static void unload(void) {
+#ifdef _WIN32
+  FreeLibrary(module);
+#else
+  dlclose(module);
+#endif
+}
+
+static void* function(const char* name) {
+#ifdef _WIN32
+  void* const address = (void*)GetProcAddress(module, name);
+#else
+  void* const address = dlsym(module, name);
 #endif
   if (address == NULL) {
-    fprintf(stderr, "host: %s of %s cannot be loaded\n", name, library);
+    fprintf(stderr, "host: the library has no %s\n", name);
     exit(1);
   }
   return address;
@@ -90,7 +114,7 @@ int main(int argc, char** argv) {
     fprintf(stderr, "usage: host LIBRARY GUID RESOURCE-URI RUNS REFERENCE...\n");
     return 2;
   }
-  const char* library = argv[1];
+  load(argv[1]);
   const int runs = atoi(argv[4]);
   const size_t count = (size_t)argc - 5;
   const size_t row = count * sizeof(double);
@@ -99,23 +123,21 @@ int main(int argc, char** argv) {
   double* again = malloc((points + 1) * row);
   for (size_t k = 0; k < count; ++k) references[k] = (fmi2ValueReference)strtoul(argv[5 + k], NULL, 10);
 
-  fmi2InstantiateTYPE* instantiate = (fmi2InstantiateTYPE*)function(library, "fmi2Instantiate");
-  fmi2FreeInstanceTYPE* free_instance = (fmi2FreeInstanceTYPE*)function(library, "fmi2FreeInstance");
-  fmi2TerminateTYPE* terminate = (fmi2TerminateTYPE*)function(library, "fmi2Terminate");
-  fmi2ResetTYPE* reset = (fmi2ResetTYPE*)function(library, "fmi2Reset");
-  fmi2GetFMUstateTYPE* get_state = (fmi2GetFMUstateTYPE*)function(library, "fmi2GetFMUstate");
-  fmi2SetFMUstateTYPE* set_state = (fmi2SetFMUstateTYPE*)function(library, "fmi2SetFMUstate");
-  fmi2FreeFMUstateTYPE* free_state = (fmi2FreeFMUstateTYPE*)function(library, "fmi2FreeFMUstate");
-  fmi2SerializedFMUstateSizeTYPE* state_size =
-      (fmi2SerializedFMUstateSizeTYPE*)function(library, "fmi2SerializedFMUstateSize");
-  fmi2SerializeFMUstateTYPE* serialize = (fmi2SerializeFMUstateTYPE*)function(library, "fmi2SerializeFMUstate");
-  fmi2DeSerializeFMUstateTYPE* deserialize =
-      (fmi2DeSerializeFMUstateTYPE*)function(library, "fmi2DeSerializeFMUstate");
-  setup_experiment = (fmi2SetupExperimentTYPE*)function(library, "fmi2SetupExperiment");
-  enter_initialization = (fmi2EnterInitializationModeTYPE*)function(library, "fmi2EnterInitializationMode");
-  exit_initialization = (fmi2ExitInitializationModeTYPE*)function(library, "fmi2ExitInitializationMode");
-  do_step = (fmi2DoStepTYPE*)function(library, "fmi2DoStep");
-  get_real = (fmi2GetRealTYPE*)function(library, "fmi2GetReal");
+  fmi2InstantiateTYPE* instantiate = (fmi2InstantiateTYPE*)function("fmi2Instantiate");
+  fmi2FreeInstanceTYPE* free_instance = (fmi2FreeInstanceTYPE*)function("fmi2FreeInstance");
+  fmi2TerminateTYPE* terminate = (fmi2TerminateTYPE*)function("fmi2Terminate");
+  fmi2ResetTYPE* reset = (fmi2ResetTYPE*)function("fmi2Reset");
+  fmi2GetFMUstateTYPE* get_state = (fmi2GetFMUstateTYPE*)function("fmi2GetFMUstate");
+  fmi2SetFMUstateTYPE* set_state = (fmi2SetFMUstateTYPE*)function("fmi2SetFMUstate");
+  fmi2FreeFMUstateTYPE* free_state = (fmi2FreeFMUstateTYPE*)function("fmi2FreeFMUstate");
+  fmi2SerializedFMUstateSizeTYPE* state_size = (fmi2SerializedFMUstateSizeTYPE*)function("fmi2SerializedFMUstateSize");
+  fmi2SerializeFMUstateTYPE* serialize = (fmi2SerializeFMUstateTYPE*)function("fmi2SerializeFMUstate");
+  fmi2DeSerializeFMUstateTYPE* deserialize = (fmi2DeSerializeFMUstateTYPE*)function("fmi2DeSerializeFMUstate");
+  setup_experiment = (fmi2SetupExperimentTYPE*)function("fmi2SetupExperiment");
+  enter_initialization = (fmi2EnterInitializationModeTYPE*)function("fmi2EnterInitializationMode");
+  exit_initialization = (fmi2ExitInitializationModeTYPE*)function("fmi2ExitInitializationMode");
+  do_step = (fmi2DoStepTYPE*)function("fmi2DoStep");
+  get_real = (fmi2GetRealTYPE*)function("fmi2GetReal");
 
   const fmi2CallbackFunctions callbacks = {tell, calloc, free, NULL, NULL};
   fmi2Component first = instantiate("first", fmi2CoSimulation, argv[2], argv[3], &callbacks, fmi2False, fmi2True);
@@ -172,5 +194,6 @@ int main(int argc, char** argv) {
   free(again);
   free(values);
   free(references);
+  unload();
   return 0;
 }
