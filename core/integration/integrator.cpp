@@ -7,6 +7,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <exception>
+#include <functional>
 #include <string>
 #include <utility>
 
@@ -485,14 +486,12 @@ void Integrator::Implementation::follow_change(Real t_end) {
     if (finite_rate(next, next_state_.data(), next_rate_.data()) != 0) break;
     if (work.steps == 0) first_step_ = std::min(h, 2.0 * step);
     ++work.steps;
-    judge_.pass(
-        next,
-        [&](Real time) {
-          hermite_cubic({t, restart_state_, rate_}, {next, next_state_, next_rate_}, time, judged_state_);
-          inputs_.values(time, judged_inputs_.data());
-          return Judge::Place{judged_state_.data(), judged_inputs_.data()};
-        },
-        modes_);
+    const auto place = [&](Real time) {
+      hermite_cubic({t, restart_state_, rate_}, {next, next_state_, next_rate_}, time, judged_state_);
+      inputs_.values(time, judged_inputs_.data());
+      return Judge::Place{judged_state_.data(), judged_inputs_.data()};
+    };
+    judge_.pass(next, std::cref(place), modes_);
     restart_state_.swap(next_state_);
     rate_.swap(next_rate_);
     knows_rate = true;

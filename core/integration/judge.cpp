@@ -87,7 +87,14 @@ void hermite_cubic(const StepEnd& from, const StepEnd& to, Real t, AlignedVector
   }
 }
 
-Judge::Judge(const ClosedLoop& loop) : loop_(loop), signals_(loop.shape()) {}
+Judge::Judge(const ClosedLoop& loop) : loop_(loop), signals_(loop.shape()) {
+  const auto give_room = [&](Node& node) {
+    node.control.resize(at(loop.shape().own_entries()));
+    node.deviation.reserve(at(loop.shape().actions()));
+  };
+  for (Node& node : nodes_) give_room(node);
+  for (Node* node : {&noted_, &middle_, &between_, &end_}) give_room(*node);
+}
 
 bool Judge::is_usable(const Node& node) { return std::isfinite(node.power) && std::isfinite(node.square); }
 

@@ -62,6 +62,28 @@ TEST(Allocation, NoneAfterTheStart) {
   }
 }
 
+TEST(Allocation, NoneWhereInputsChangeAtEveryPoint) {
+  for (const testing::Recipe& recipe : testing::assorted_recipes()) {
+    ClosedLoop loop(parse_game(testing::toml_of(testing::random_game(recipe))).parameters);
+    Inputs input(loop.inputs().size());
+    Integrator integrator(loop, input, make_structured_newton());
+    integrator.start(0.0, {1e-6, 1e-8});
+    const auto follow = [&](int first, int last) {
+      for (int k = first; k <= last; ++k) {
+        input.set_value(0, 0.1 * k);
+        integrator.restart(false);
+        integrator.advance(0.01 * k);
+      }
+    };
+    follow(1, 10);
+    allocations = 0;
+    counting = true;
+    follow(11, 60);
+    counting = false;
+    EXPECT_EQ(allocations, 0) << "game " << recipe.seed;
+  }
+}
+
 TEST(Allocation, NoneAlongADirection) {
   for (const testing::Recipe& recipe : testing::assorted_recipes()) {
     const ClosedLoop loop(parse_game(testing::toml_of(testing::random_game(recipe))).parameters);
