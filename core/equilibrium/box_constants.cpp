@@ -293,7 +293,7 @@ class DynamicsRows {
         PolynomialDynamics::linear, [](const Interval& x) { return x; },
         [](const Interval&) { return Interval::of(1.0); });
     add_terms(
-        PolynomialDynamics::square, [](const Interval& x) { return square(x); },
+        PolynomialDynamics::square, [](const Interval& x) { return squared(x); },
         [](const Interval& x) { return Interval::of(2.0) * x; });
     const Interval gain = Interval::of(coefficients[PolynomialDynamics::gain][at(i)]);
     for (Interval& each : rows) each = gain * each;

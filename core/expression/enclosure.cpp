@@ -156,7 +156,7 @@ Enclosure::Found Enclosure::evaluate(const std::function<Interval(const Leaf&)>&
     narrow(a, domain.a);
     if (node.b >= 0) narrow(b, domain.b);
     if (domain.meets_edge) is_cut_at(node.operation == Operation::divide ? b : a);
-    row = {.value = node.operation == Operation::multiply && &a == &b ? square(a.value)
+    row = {.value = node.operation == Operation::multiply && &a == &b ? squared(a.value)
                                                                       : enclose(node.operation, a.value, b.value),
            .form = form_of(node.operation, a.form, b.form),
            .found = found};

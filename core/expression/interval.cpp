@@ -148,7 +148,7 @@ Interval operator*(const Interval& a, const Interval& b) {
       {product(a.lower, b.lower), product(a.lower, b.upper), product(a.upper, b.lower), product(a.upper, b.upper)});
 }
 
-Interval square(const Interval& a) {
+Interval squared(const Interval& a) {
   const Real largest = a.magnitude();
   const Real least = least_magnitude(a);
   return {product(least, least).lower, product(largest, largest).upper};

@@ -42,6 +42,6 @@ Domain domain_of(Operation operation, const Interval& a, const Interval& b);
 /// few units in the last place at most.
 Interval enclose(Operation operation, const Interval& a, const Interval& b);
 /// a a, which is no product of two that differ.
-Interval square(const Interval& a);
+Interval squared(const Interval& a);
 
 }  // namespace mixed_order_game

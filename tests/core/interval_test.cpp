@@ -52,7 +52,7 @@ TEST(Intervals, KeepWhatIsExact) {
   const Interval sum = enclose(Operation::add, Interval::of(0.5), {0.25, 1.0});
   EXPECT_EQ(sum.lower, 0.75);
   EXPECT_EQ(sum.upper, 1.5);
-  const Interval slope = enclose(Operation::subtract, Interval::of(1.0), square(enclose(Operation::tanh, {}, {})));
+  const Interval slope = enclose(Operation::subtract, Interval::of(1.0), squared(enclose(Operation::tanh, {}, {})));
   EXPECT_EQ(slope.lower, 0.0);
   EXPECT_EQ(slope.upper, 1.0);
   // 0.1 + 0.2 rounds up to 0.30000000000000004

@@ -11,6 +11,7 @@ from typer.testing import CliRunner, Result
 
 from mixed_order_game import default_game, load, package_version
 from mixed_order_game.cli.app import app
+from mixed_order_game.results.metrics import JUDGED
 
 COMMANDS = ["build", "info", "run", "validate", "plot", "demo"]
 
@@ -172,6 +173,7 @@ def test_run_writes_files(suffix: str, fmu: Path, tmp_path: Path) -> None:
         "x[1,2]",
         *(f"v[{i},{k}]" for i in (4, 5) for k in (1, 2)),
         "nash_error",
+        *JUDGED,
     ]
     if suffix == ".parquet":
         assert loaded.parameters["a[1,3]"] == 0.5

@@ -251,6 +251,7 @@ def test_stored_results(fmu: Path, tmp_path: Path) -> None:
     assert [figure.name for figure in figures(report(few, tmp_path / "few.html").evidence)] == [
         "actions",
         "plane",
+        "error",
     ]
     with pytest.raises(GameError, match="takes neither parameters"):
         report(few, tmp_path / "few.html", changes={"k1": 1.0})

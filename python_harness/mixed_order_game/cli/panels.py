@@ -21,7 +21,7 @@ PANELS = {
         "tolerance",
     ),
     "What it is judged by": (
-        "band", "claims", "largest_error", "neighbourhood", "radius", "settle_time",
+        "band", "box", "claims", "largest_error", "neighbourhood", "radius", "settle_time",
         "settling_time", "strict",
     ),
     "What is written": (

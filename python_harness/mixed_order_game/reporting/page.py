@@ -265,13 +265,17 @@ def _finite(value: float, unit: str, otherwise: str) -> str:
 
 
 def _settings(evidence: Evidence) -> list[tuple[str, str, str]]:
-    """Parameters that differ from the FMU's start values: name, value, start value."""
+    """Parameters that differ from the FMU's start values: name, value, start value.
+
+    From when on errors are judged is no property of what ran.
+    """
     model, result = evidence.model, evidence.result
     if model is None:
         return []
     return [
         (name, _number(value), _number(model.variable(name).start))
         for name, value in model.changed_values(result.parameters).items()
+        if name != "judge_from"
     ]
 
 
