@@ -259,18 +259,7 @@ class DynamicsRows {
     Enclosure::Found found;
     if (const OfPlayer* player = players_[at(i)].get(); player != nullptr) {
       std::vector<Interval> of_nodes;
-      found = player->enclosure->evaluate(
-          [&](const Leaf& leaf) {
-            switch (leaf.kind) {
-              case LeafKind::action:
-                return box[at(leaf.index)];
-              case LeafKind::parameter:
-                return Interval::of(coefficients.named[at(leaf.index)]);
-              default:
-                return Interval{};
-            }
-          },
-          of_nodes);
+      found = player->enclosure->evaluate(box, coefficients.named, of_nodes);
       std::copy_n(of_nodes.begin(), shape.dimension, values.begin());
       for (std::size_t k = 0; k < player->place.size(); ++k) {
         const auto [l, column] = player->place[k];

@@ -86,18 +86,7 @@ Enclosure::Found HessianBounds::enclose(int i, Columns columns, const std::vecto
   if (players_[at(i)] == nullptr) return {};
   const Derivatives& derivatives = columns == Columns::own ? players_[at(i)]->own : players_[at(i)]->all;
   std::vector<Interval> of_nodes;
-  const Enclosure::Found found = derivatives.enclosure->evaluate(
-      [&](const Leaf& leaf) {
-        switch (leaf.kind) {
-          case LeafKind::action:
-            return box[at(leaf.index)];
-          case LeafKind::parameter:
-            return Interval::of(coefficients.named[at(leaf.index)]);
-          default:
-            return Interval{};
-        }
-      },
-      of_nodes);
+  const Enclosure::Found found = derivatives.enclosure->evaluate(box, coefficients.named, of_nodes);
   if (found.definition == Enclosure::Definition::nowhere) return found;
   for (std::size_t k = 0; k < derivatives.place.size(); ++k) {
     const auto [l, column] = derivatives.place[k];

@@ -170,4 +170,20 @@ Enclosure::Found Enclosure::evaluate(const std::function<Interval(const Leaf&)>&
   return found;
 }
 
+Enclosure::Found Enclosure::evaluate(const std::vector<Interval>& actions, const std::vector<Real>& parameters,
+                                     std::vector<Interval>& values) const {
+  return evaluate(
+      [&](const Leaf& leaf) {
+        switch (leaf.kind) {
+          case LeafKind::action:
+            return actions[at(leaf.index)];
+          case LeafKind::parameter:
+            return Interval::of(parameters[at(leaf.index)]);
+          default:
+            return Interval{};
+        }
+      },
+      values);
+}
+
 }  // namespace mixed_order_game

@@ -28,6 +28,9 @@ class Enclosure {
   /// Switches hold what their own conditions say at each point; where one is not decided, all that it can hold.
   /// Branches that no point of the box takes need not be defined.
   Found evaluate(const std::function<Interval(const Leaf&)>& box, std::vector<Interval>& values) const;
+  /// The same for actions in a box and parameters at their values; any other leaf may be anything.
+  Found evaluate(const std::vector<Interval>& actions, const std::vector<Real>& parameters,
+                 std::vector<Interval>& values) const;
 
  private:
   struct Node {

@@ -12,7 +12,8 @@ from typer.testing import CliRunner, Result
 from mixed_order_game import GameError, default_game
 from mixed_order_game.cli.app import app
 from mixed_order_game.fmu.build import build_fmu
-from mixed_order_game.game.check import _judged, _place, check_game
+from mixed_order_game.game.check import _place, check_game
+from mixed_order_game.game.host_tool import ask
 from mixed_order_game.game.new import Recipe, new_game
 from mixed_order_game.theory.analysis import analyse
 from mixed_order_game.theory.game import read_game
@@ -249,7 +250,7 @@ def test_places(tmp_path: Path) -> None:
         ("player", 1, "cost", "linear", "x"): (14, 8),
         ("nothing", "at", 7, "all"): (1, 1),
     }
-    found = _judged(path)["places"]
+    found = ask("--check", path)["places"]
     assert {entry: _place(entry, found) for entry in places} == places
 
 

@@ -5,6 +5,7 @@ import json
 import os
 import socket
 import threading
+from abc import abstractmethod
 from collections.abc import Awaitable, Callable
 from pathlib import Path
 from typing import Any
@@ -162,9 +163,9 @@ class Asked(Guarded):
         self.set_header("Cache-Control", "no-store")
         self.finish(answer)
 
+    @abstractmethod
     def answer(self, wish: Wish, *arguments: str) -> Awaitable[bytes | dict[str, Any]]:
         """What is sent. Raises MixedOrderGameError, Superseded."""
-        raise NotImplementedError
 
     def refusal(self, problem: str) -> bytes | dict[str, Any]:
         """What is sent in place of the answer."""

@@ -6,7 +6,6 @@ intervals, on the box cut into parts, and looks at sample points beside.
 
 import json
 import math
-import subprocess
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,11 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import BuildError, GameError, reason
-from ..files.reading import suffix_of
-from ..files.temporary import temporary_folder
-from ..fmu.build import host_tool
-from .equilibrium import game_in
+from .host_tool import ask, file_of
 
 FloatArray = NDArray[np.float64]
 
@@ -84,31 +79,11 @@ def game_bounds(
 
     Raises GameError if the game is none or does not take the changes, BuildError without the host tool.
     """
-    if suffix_of(game) != ".toml":
-        with temporary_folder(BuildError) as folder:
-            file = folder / "game.toml"
-            file.write_bytes(game_in(game))
-            return game_bounds(file, box, x_star, changes)
     pairs = zip(box.lower.ravel().tolist(), box.upper.ravel().tolist(), strict=True)
     settings = (f"{json.dumps(name)} = {float(value)!r}" for name, value in (changes or {}).items())
     request = f"box = {[list(pair) for pair in pairs]}\nsettings = {{ {', '.join(settings)} }}\n"
-    tool = host_tool()
-    try:
-        finished = subprocess.run(
-            [str(tool), "--constants", str(game)],
-            input=request,
-            capture_output=True,
-            encoding="utf-8",
-            errors="replace",
-            check=False,
-        )
-    except OSError as error:
-        raise BuildError(f"cannot run {tool}: {reason(error)}") from error
-    if finished.returncode == 1:
-        raise GameError(" ".join(finished.stderr.split()))
-    if finished.returncode != 0:
-        raise BuildError(f"{tool.name} ended with status {finished.returncode}: {finished.stderr.strip()}")
-    told = json.loads(finished.stdout)
+    with file_of(game) as file:
+        told = ask("--constants", file, request)
     return GameBounds(
         box=box,
         x_star=x_star,

@@ -5,18 +5,17 @@ tells where every entry of the file stands; the JSON Schema finds those problems
 """
 
 import difflib
-import json
 import math
-import subprocess
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ..errors import BuildError, GameError, reason
+from ..errors import GameError
 from ..extras import has, need
 from ..files.reading import ReadError, expect_file, read_text, toml_of
-from ..fmu.build import game_file, host_tool
+from ..fmu.build import game_file
+from .host_tool import ask
 from .schema import game_schema
 
 LONGEST_TEXT = 40
@@ -68,7 +67,7 @@ def check_game(game: Path | str) -> tuple[Problem, ...]:
     """
     game = game_file(game)
     expect_file(game, "game file", GameError)
-    answer = _judged(game)
+    answer = ask("--check", game)  # problem is None if it is valid
     if answer["problem"] is None:
         return ()
     told = answer["problem"]
@@ -82,19 +81,6 @@ def check_game(game: Path | str) -> tuple[Problem, ...]:
         others = (each for each in _violations(document) if _shown(each.entry) != told["entry"])
         problems |= {Problem(*_place(each.entry, places), each.sentence) for each in others}
     return tuple(sorted(problems))
-
-
-def _judged(game: Path) -> Any:
-    """The host tool's answer about a game; problem is None if it is valid."""
-    tool = host_tool()
-    try:
-        finished = subprocess.run([str(tool), "--check", str(game)], capture_output=True, check=False)
-    except OSError as error:
-        raise BuildError(f"cannot run {tool}: {reason(error)}") from error
-    if finished.stdout and finished.returncode in (0, 1):
-        return json.loads(finished.stdout)
-    said = finished.stderr.decode("utf-8", errors="replace").strip()
-    raise BuildError(f"{tool.name} ended with status {finished.returncode}: {said}")
 
 
 def _place(entry: Entry, places: Mapping[str, Sequence[int]]) -> tuple[int, int]:

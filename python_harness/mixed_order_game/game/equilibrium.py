@@ -4,21 +4,19 @@ The host tool judges: by the second derivatives at x*, by interval evaluation of
 searches from other starts.
 """
 
-import json
 import math
-import subprocess
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import BuildError, GameError, ModelError, reason
-from ..files.reading import expect_file, suffix_of
-from ..files.temporary import temporary_folder
-from ..fmu.build import GameSource, host_tool, source_of
+from ..errors import GameError
+from ..files.reading import expect_file
+from ..fmu.build import GameSource, source_of
+from .host_tool import ask, file_of
 
 FloatArray = NDArray[np.float64]
 
@@ -126,44 +124,12 @@ def judge_equilibrium(game: GameSource) -> Equilibrium | None:
     """
     source = source_of(game)
     expect_file(source, "file", GameError)
-    if suffix_of(source) == ".toml":
-        return _judged(source)
-    with temporary_folder(BuildError) as folder:
-        file = folder / "game.toml"
-        file.write_bytes(game_in(source))
-        return _judged(file)
+    with file_of(source) as file:
+        told = ask("--judge", file)
+    return None if told is None else _equilibrium(told)
 
 
-def game_in(fmu: Path) -> bytes:
-    """The game file that an FMU holds. Raises ModelError."""
-    import zipfile
-
-    try:
-        with zipfile.ZipFile(fmu) as archive:
-            return archive.read("resources/game.toml")
-    except (OSError, EOFError, KeyError, RuntimeError, ValueError, zipfile.BadZipFile) as error:
-        raise ModelError(f"{fmu} cannot be read as an FMU of a game: {reason(error)}") from error
-
-
-def _judged(game: Path) -> Equilibrium | None:
-    tool = host_tool()
-    try:
-        finished = subprocess.run(
-            [str(tool), "--judge", str(game)],
-            capture_output=True,
-            encoding="utf-8",
-            errors="replace",
-            check=False,
-        )
-    except OSError as error:
-        raise BuildError(f"cannot run {tool}: {reason(error)}") from error
-    if finished.returncode == 1:
-        raise GameError(" ".join(finished.stderr.split()))
-    if finished.returncode != 0:
-        raise BuildError(f"{tool.name} ended with status {finished.returncode}: {finished.stderr.strip()}")
-    told = json.loads(finished.stdout)
-    if told is None:
-        return None
+def _equilibrium(told: Mapping[str, Any]) -> Equilibrium:
     return Equilibrium(
         kind=Kind(told["kind"]),
         x_star=np.array(told["x_star"]),
