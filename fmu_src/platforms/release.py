@@ -126,7 +126,8 @@ def pythons() -> Iterator[Path]:
 def tried(wheel: Path, interpreter: Path) -> Path:
     """Install a wheel into an empty environment and run the demo there; returns the folder of its commands.
 
-    Nothing but the environment is on the path. Raises ReleaseError if a compiler is there all the same.
+    Without extras, then with that of the figures. Nothing but the environment is on the path. Raises
+    ReleaseError if a compiler is there all the same.
     """
     environment = WORK / "environment"
     shutil.rmtree(environment, ignore_errors=True)
@@ -135,7 +136,6 @@ def tried(wheel: Path, interpreter: Path) -> Path:
     bare = {"PATH": str(commands), "HOME": str(WORK), "MPLCONFIGDIR": str(WORK)}
     if found := [name for name in COMPILERS if shutil.which(name, path=str(commands))]:
         raise ReleaseError(f"{commands} holds {', '.join(found)}")
-    before = megabytes(environment)
     install = ("-m", "pip", "--disable-pip-version-check", "install", "--quiet", "--only-binary", ":all:")
     # the package index may need settings of this machine's environment
     index = {
@@ -143,23 +143,26 @@ def tried(wheel: Path, interpreter: Path) -> Path:
         for name, value in os.environ.items()
         if name.startswith(("PIP_", "SSL_")) or "proxy" in name
     }
-    subprocess.run([commands / "python", *install, wheel], check=True, env=index | bare)
-    size = megabytes(environment) - before
-    began = time.monotonic()
-    done = subprocess.run(
-        [commands / "mog", "demo", "--output", WORK / "demo"],
-        capture_output=True,
-        text=True,
-        check=False,
-        env=bare,
-        cwd=WORK,
-    )
-    if done.returncode != 0:
-        raise ReleaseError(f"mog demo of {wheel.name} failed: {done.stdout}{done.stderr}")
     version = subprocess.run(
         [commands / "python", "--version"], capture_output=True, text=True, check=True
     ).stdout
-    say(f"{wheel.name}, {version.strip()}: installed {size:.0f} MB, demo in {time.monotonic() - began:.0f} s")
+    before = megabytes(environment)
+    for extra in ("", "[plot]"):
+        subprocess.run([commands / "python", *install, f"{wheel}{extra}"], check=True, env=index | bare)
+        size = megabytes(environment) - before
+        began = time.monotonic()
+        done = subprocess.run(
+            [commands / "mog", "demo", "--output", WORK / f"demo{extra}"],
+            capture_output=True,
+            text=True,
+            check=False,
+            env=bare,
+            cwd=WORK,
+        )
+        if done.returncode != 0:
+            raise ReleaseError(f"mog demo of {wheel.name}{extra} failed: {done.stdout}{done.stderr}")
+        seconds = time.monotonic() - began
+        say(f"{wheel.name}{extra}, {version.strip()}: installed {size:.0f} MB, demo in {seconds:.0f} s")
     return commands
 
 

@@ -12,6 +12,7 @@ EXTRAS = {
     "jinja2": "report",
     "jsonschema": "check",
     "latex2mathml": "report",
+    "matplotlib": "plot",
     "pandas": "tables",
     "plotly": "report",
     "pyarrow": "parquet",

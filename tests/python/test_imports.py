@@ -98,6 +98,7 @@ def test_a_missing_package_is_told_with_its_extra(
         "tornado": ["explore", fmu, "--no-browser"],
         "jinja2": ["report", fmu, "--output", tmp_path / "a.html"],
         "latex2mathml": ["report", fmu, "--output", tmp_path / "a.html"],
+        "matplotlib": ["plot", fmu, "--output", tmp_path],
         "plotly": ["report", fmu, "--output", tmp_path / "a.html"],
         "distributed": [
             "sweep",

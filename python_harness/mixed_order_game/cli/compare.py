@@ -73,6 +73,7 @@ def compare(
 
     mog compare first.parquet second.parquet --json
     """
+    from ..extras import need
     from ..files.writing import FIGURE, RESULT
     from ..studies.compare import compare as run_variants
     from ..studies.compare import load_results
@@ -83,6 +84,7 @@ def compare(
     if sources and len(files) == len(sources) and (fixed or wanted):
         raise typer.BadParameter("results are not run again", param_hint="--variant, --set")
     if figure is not None:
+        need("matplotlib")
         output_option(figure, FIGURE, inputs=sources or [], force=force, hint="--figure")
         load_results(files, ["nash_error"])  # which may be missing, before any run
     found = run_variants(

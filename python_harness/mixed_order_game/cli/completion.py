@@ -51,6 +51,10 @@ def complete_graphs(incomplete: str) -> list[str]:
 
 def complete_kind(incomplete: str) -> list[str]:
     """Kinds of figures."""
+    from ..extras import has
+
+    if not has("matplotlib"):
+        return []
     from ..results.plot import KINDS
 
     return [kind for kind in KINDS if kind.startswith(incomplete)]

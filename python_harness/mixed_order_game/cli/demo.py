@@ -33,6 +33,7 @@ def demo(
 
     [bold]Example:[/bold] mog demo --output demo
     """
+    from ..extras import has, install
     from ..fmu.build import fmu_of
     from ..studies.demo import demo as demonstrate
 
@@ -41,4 +42,6 @@ def demo(
         done = demonstrate(path, output, suffix=f".{file_format.value}", force=force, progress=show)
     for file in done.files:
         typer.echo(file, err=as_json)
+    if not has("matplotlib"):
+        typer.echo(f"mog: no figures without matplotlib: {install('matplotlib')}", err=True)
     show_validation(done.validation, as_json=as_json, strict=False)

@@ -60,7 +60,10 @@ def plot(
 
     mog plot result.parquet --width page --kind positions --kind control --until 2
     """
+    from ..extras import need
     from ..files.writing import FIGURE, RESULT
+
+    need("matplotlib")
     from ..results.plot import COLUMN_WIDTH, KINDS, PAGE_WIDTH, cut, result_figures, save_figure
     from ..results.result import load
 

@@ -128,6 +128,7 @@ def sweep(
 
     mog sweep my_game.toml --initial-states 50 --initial-actions -5:5 --scheduler tcp://10.0.0.1:8786
     """
+    from ..extras import need
     from ..files.writing import FIGURE
     from ..fmu.build import fmu_of
     from ..fmu.model import read_model
@@ -167,7 +168,8 @@ def sweep(
             neighbourhood=neighbourhood,
         )
     if maps:
-        from ..studies.sweep.figures import check_heat_map  # needs matplotlib
+        need("matplotlib")
+        from ..studies.sweep.figures import check_heat_map
     for names in maps:
         check_heat_map(definition, *names)
         output_option(_map_file(output, names), FIGURE, force=force, hint="--heat-map")
@@ -204,15 +206,15 @@ def _show(
     as_json: bool,
     force: bool,
 ) -> None:
-    from ..results.plot import save_figure
-    from ..studies.sweep.figures import plot_heat_map
-
     missed = [] if definition.neighbourhood is None else result.misses(definition.neighbourhood).tolist()
     if as_json:
         typer.echo(json.dumps(_data(result, missed, definition.neighbourhood), indent=2))
     else:
         _print(result, definition)
     for names in maps:
+        from ..results.plot import save_figure
+        from ..studies.sweep.figures import plot_heat_map
+
         path = save_figure(plot_heat_map(result, *names), _map_file(result.folder, names), force=force)
         typer.echo(path, err=as_json)
     failed = result.failed.tolist()

@@ -9,6 +9,7 @@ import tomlkit
 from tomlkit.exceptions import TOMLKitError
 
 from ..errors import GameError, MissingEntryError
+from ..extras import need
 from ..files.reading import ReadError, expect_file, read_text
 from ..files.temporary import temporary_folder
 from ..files.writing import GAME, write_file
@@ -147,9 +148,12 @@ class Game:
 
         Raises
         ------
+        MissingPackageError
+            If Matplotlib is not installed.
         GameError
             For a game that breaks the definition of one.
         """
+        need("matplotlib")
         from ..results.plot import plot_graph
 
         model = self.model()

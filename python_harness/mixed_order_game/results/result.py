@@ -304,6 +304,8 @@ class Result:
 
         Raises
         ------
+        MissingPackageError
+            If Matplotlib is not installed.
         PlotError
             For another kind, and for a figure that this game does not have.
         ResultError
@@ -315,6 +317,7 @@ class Result:
         >>> result.plot("error").get_yscale()
         'log'
         """
+        need("matplotlib")
         from .plot import draw
 
         return draw(self, kind, axes, width=width)

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
 from ..errors import MixedOrderGameError, ResultError, SimulationError
+from ..extras import need
 from ..files.writing import RESULT
 from ..fmu.build import SOURCE_OR_RESULT, GameSource, fmu_of
 from ..fmu.model import Model, Value, read_model
@@ -103,9 +104,12 @@ class Comparison:
 
         Raises
         ------
+        MissingPackageError
+            If Matplotlib is not installed.
         ResultError
             If nash_error was not recorded.
         """
+        need("matplotlib")
         from ..results.plot import plot_error
 
         return plot_error(self.results, axes, width=width)

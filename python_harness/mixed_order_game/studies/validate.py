@@ -9,6 +9,7 @@ from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from ..errors import ExperimentError, ModelError, PlotError, SimulationError
+from ..extras import need
 from ..fmu.build import GameSource
 from ..fmu.model import Model
 from ..fmu.run import Progress, Simulator
@@ -84,9 +85,12 @@ class Validation:
 
         Raises
         ------
+        MissingPackageError
+            If Matplotlib is not installed.
         PlotError
             If no run came to its end.
         """
+        need("matplotlib")
         from ..results.plot import plot_error
 
         runs = {"robust, perturbed": self.robust, "neither": self.plain}

@@ -96,11 +96,14 @@ class SweepResult:
 
         Raises
         ------
+        MissingPackageError
+            If Matplotlib is not installed.
         ResultError
             For a column that does not exist.
         PlotError
             If x or y does not vary.
         """
+        need("matplotlib")
         from .figures import plot_heat_map
 
         return plot_heat_map(self, x, y, value, axes, width=width)
