@@ -545,7 +545,13 @@ void Integrator::Implementation::take_step() {
   }
   if (!event_pending_) {
     inputs_.values(internal_time_, judged_inputs_.data());
-    judge_.note(internal_time_, {N_VGetArrayPointer(vector_.get()), judged_inputs_.data()}, modes_, signals_);
+    const Judge::Place place{N_VGetArrayPointer(vector_.get()), judged_inputs_.data()};
+    const AlignedVector* error = layer_.error();  // at the solution, which is this place
+    if (error == nullptr) {
+      loop_.evaluate_errors(place.state, place.inputs, modes_, signals_);
+      error = &signals_.error;
+    }
+    judge_.note(internal_time_, place, *error, signals_.network);
   }
 }
 

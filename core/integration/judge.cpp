@@ -37,6 +37,8 @@ bool may_peak(Real record, Real fa, Real fb, Real c, Real h) {
   return std::fabs(fb - fa) < 2.0 * bend && std::max(std::fabs(fa), std::fabs(fb)) + 0.5 * bend > record;
 }
 
+constexpr Real squared(Real value) { return value * value; }
+
 struct Peak {
   Real t;
   Real value;
@@ -100,7 +102,7 @@ bool Judge::is_usable(const Node& node) { return std::isfinite(node.power) && st
 
 void Judge::look_at_control(Node& node) {
   loop_.evaluate_control(signals_);
-  node.control = signals_.control;
+  node.control.swap(signals_.control);  // all of which is written anew each time
   node.power = 0.0;
   for (const Real u : node.control) node.power += u * u;
   node.differences[0] = node.power;
@@ -125,10 +127,10 @@ void Judge::look(Real t, const Place& place, const Modes& modes, Node& node) {
   look_at_deviation(place, node);
 }
 
-void Judge::note(Real t, const Place& place, const Modes& modes, const Signals& evaluated) {
+void Judge::note(Real t, const Place& place, const AlignedVector& error, const AlignedVector& network) {
   noted_.t = t;
-  loop_.evaluate_errors(place.state, place.inputs, modes, signals_);
-  signals_.network = evaluated.network;
+  signals_.error = error;
+  signals_.network = network;
   if (loop_.parameters().strategy.robust) loop_.evaluate_robust_term(signals_);
   look_at_control(noted_);
   look_at_deviation(place, noted_);
@@ -199,9 +201,12 @@ bool Judge::is_outside(Real square, const Judgement& judgement) {
   return judgement.squared_band > 0.0 && square > judgement.squared_band;
 }
 
-/// What one point alone tells of peaks.
+/// What one point alone tells of peaks. No entry is larger than the norm.
 void Judge::observe(const Node& node, Judgement& judgement) {
-  for (const Real u : node.control) judgement.control_peak = std::max(judgement.control_peak, std::fabs(u));
+  if (node.power > squared(judgement.control_peak)) {
+    for (const Real u : node.control) judgement.control_peak = std::max(judgement.control_peak, std::fabs(u));
+  }
+  if (node.square <= squared(error_record(node.t, judgement))) return;
   for (std::size_t p = 0; p < node.deviation.size(); ++p) {
     const Real side = judgement.side[p];
     const Real size = std::fabs(node.deviation[p]);
@@ -311,7 +316,26 @@ Real Judge::energy(const Step& step, const std::array<Real, 3>& t, const std::ar
          energy(step, {t[1], right, t[2]}, {power[1], power_right, power[2]}, 0.5 * tolerance, halvings - 1);
 }
 
+/// The record of deviations that counts at time t: that of whatever is judged then.
+Real Judge::error_record(Real t, const Judgement& judgement) {
+  return t < judgement.errors_from ? judgement.farthest_beyond
+                                   : std::min(judgement.error_peak, judgement.farthest_beyond);
+}
+
+/// Whether no entry of a vector, whose squared norm is given, can reach a record on a step: with the norm M at its
+/// three points an entry's parabola rises above the chord by at most M times the ratio of their distances, which counts
+/// twice as in may_peak.
+bool Judge::stays_below(Real record, const Step& step, Real Node::* squared_norm) {
+  const Real norm2 = std::max({step.begin->*squared_norm, step.end->*squared_norm, step.third->*squared_norm});
+  // of points r < a < b, or of a < r < b, where the parabola through the middle turns
+  const Real a = step.begin->t;
+  const Real r = step.third->t;
+  const Real ratio = r < a ? step.h / (a - r) : 4.0;
+  return norm2 * squared(1.0 + ratio) <= squared(record);
+}
+
 void Judge::find_control_peak(const Step& step, Judgement& judgement) {
+  if (stays_below(judgement.control_peak, step, &Node::power)) return;
   const HalfCurvature half_curvature(step.begin->t, step.end->t, step.third->t);
   for (std::size_t p = 0; p < step.end->control.size(); ++p) {
     const Real fa = step.begin->control[p];
@@ -335,12 +359,14 @@ void Judge::find_error_peaks(const Step& step, Judgement& judgement) {
       judgement.error_peak = std::max(judgement.error_peak, std::fabs(deviation));
     }
   }
+  const Real record = error_record(step.end->t, judgement);
+  if (stays_below(record, step, &Node::square)) return;
   const HalfCurvature half_curvature(step.begin->t, step.end->t, step.third->t);
   for (std::size_t p = 0; p < step.end->deviation.size(); ++p) {
     const Real fa = step.begin->deviation[p];
     const Real fb = step.end->deviation[p];
     const Real c = half_curvature(fa, fb, step.third->deviation[p]);
-    if (!may_peak(std::min(judgement.error_peak, judgement.farthest_beyond), fa, fb, c, step.h)) continue;
+    if (!may_peak(record, fa, fb, c, step.h)) continue;
     const auto deviation = [&](Real t) { return deviation_at(t, step).deviation[p]; };
     if (is_judged && may_peak(judgement.error_peak, fa, fb, c, step.h)) {
       const Peak first{from, std::fabs(from > step.begin->t ? deviation(from) : fa)};

@@ -81,9 +81,9 @@ class Judge {
   /// What follows is judged by this end alone, not by those before.
   void forget_past() { count_ = std::min(count_, 1); }
 
-  /// The end of a step at time t, to be passed once the run has gone beyond it. The network is taken as it was
-  /// evaluated last, which was for this state but for the last correction of an iteration.
-  void note(Real t, const Place& place, const Modes& modes, const Signals& evaluated);
+  /// The end of a step at time t, to be passed once the run has gone beyond it, with e and w'S there. The latter may be
+  /// as it was evaluated last, which was for this state but for the last correction of an iteration.
+  void note(Real t, const Place& place, const AlignedVector& error, const AlignedVector& network);
   [[nodiscard]] bool has_noted() const { return has_noted_; }
   /// Judges the step up to the end that was noted.
   void pass_noted(const Path& path, const Modes& modes);
@@ -125,6 +125,8 @@ class Judge {
   [[nodiscard]] static bool is_usable(const Node& node);
   void keep(Node& node);
   static void observe(const Node& node, Judgement& judgement);
+  [[nodiscard]] static Real error_record(Real t, const Judgement& judgement);
+  [[nodiscard]] static bool stays_below(Real record, const Step& step, Real Node::* squared_norm);
   [[nodiscard]] static bool is_outside(Real square, const Judgement& judgement);
   void go_on(Node& end, const Path& path, const Modes& modes, Judgement& judgement);
   /// What is known between two ends.

@@ -42,11 +42,13 @@ void RobustLayer::find_weights(const LoopJacobian& jacobian, Real gamma, const R
 bool RobustLayer::linearization_holds(const LoopJacobian& jacobian, const Signals& signals, const Modes& modes,
                                       const Real* state, const Real* inputs, Real gamma, const Real* weight,
                                       Real tolerance) {
+  looked_ = false;
   if (!loop_.parameters().strategy.robust) return true;
   const GainRows& gains = loop_.gains();
   if (std::all_of(gains.delta.begin(), gains.delta.end(), [](Real delta) { return delta == 0.0; })) return true;
   const std::size_t columns = place_.size();
   loop_.evaluate_errors(state, inputs, modes, trial_);
+  looked_ = true;
   find_weights(jacobian, gamma, weight);
   const auto change = [&](std::size_t p) { return trial_.error[p] - signals.error[p]; };
   const auto counted = [&](std::size_t p, Real defect) {

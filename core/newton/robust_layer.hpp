@@ -21,6 +21,9 @@ class RobustLayer {
                                          const Real* state, const Real* inputs, Real gamma, const Real* weight,
                                          Real tolerance);
 
+  /// e at the state that linearization_holds() looked at last; null when it had no need to look.
+  [[nodiscard]] const AlignedVector* error() const { return looked_ ? &trial_.error : nullptr; }
+
   /// Stops columns that a correction, which set out from the signals' state, carried across the layer: puts them in its
   /// middle e = 0 by their velocity or (order 1) action. False when there was none. On either side of the middle
   /// e + a phi(e) is concave or convex, so that Newton's iteration with a Jacobian of its own at each iterate converges
@@ -35,6 +38,7 @@ class RobustLayer {
   // so that the robust term enters no rate
   std::vector<int> place_;
   Signals trial_;
+  bool looked_ = false;   // at trial_
   AlignedVector weight_;  // per column
 };
 
