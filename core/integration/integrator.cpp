@@ -513,7 +513,8 @@ void Integrator::Implementation::take_step() {
   const int flag = CVode(cvode_.get(), horizon, vector_.get(), &internal_time_, CV_ONE_STEP);
   if (flag < 0) fail(flag, internal_time_);
   ++steps_since_restart_;
-  if (!(internal_time_ > before)) {
+  // CVODE does not say at once that a step after an event within it ended at the stop time
+  if (!(internal_time_ > before) && flag != CV_TSTOP_RETURN) {
     stop(before, N_VGetArrayPointer(vector_.get()),
          "the steps that the relative tolerance " + number_text(tolerances_.relative) +
              " asks for fell below the resolution of time");

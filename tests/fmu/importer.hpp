@@ -2,6 +2,7 @@
 // event indicators located by bisection.
 #pragma once
 
+#include "loop/located_conditions.hpp"
 #include "slave.hpp"
 
 class Importer : public Slave {
@@ -11,7 +12,7 @@ class Importer : public Slave {
 
   [[nodiscard]] std::size_t states() const { return model().variables.states().size(); }
   [[nodiscard]] std::size_t indicators() const {
-    return static_cast<std::size_t>(model().game.parameters.shape.actions());
+    return static_cast<std::size_t>(mixed_order_game::LocatedConditions::located(model().game.parameters));
   }
 
   /// From instantiated to continuous-time mode.
