@@ -12,6 +12,7 @@
 
 #include "call_code.hpp"
 #include "fuzzed_game.hpp"
+#include "loop/located_conditions.hpp"
 
 using namespace mixed_order_game;
 
@@ -139,11 +140,7 @@ class Session {
   }
   /// Of vectors whose length the importer knows; now and then another.
   std::size_t length(std::size_t right) { return bytes_.byte() < 16 ? bytes_.below(right + 3) : right; }
-  [[nodiscard]] std::size_t states() const {
-    const Shape& shape = instance_.game.model.game.parameters.shape;
-    const std::size_t n = at(shape.actions());
-    return n * (2 + at(shape.players) + at(shape.neurons));
-  }
+  [[nodiscard]] std::size_t states() const { return instance_.game.model.variables.states().size(); }
   static fmi2Status finite(fmi2Status status, const std::vector<double>& values) {
     require(status != fmi2OK || std::all_of(values.begin(), values.end(), [](double v) { return std::isfinite(v); }),
             "what is given under fmi2OK is finite");
@@ -291,7 +288,7 @@ class Session {
         return finite(fmi2GetDerivatives(c(), values.data(), values.size()), values);
       }
       case CallCode::get_event_indicators: {
-        std::vector<double> values(length(at(instance_.game.model.game.parameters.shape.actions())));
+        std::vector<double> values(length(at(LocatedConditions::located(instance_.game.model.game.parameters))));
         return finite(fmi2GetEventIndicators(c(), values.data(), values.size()), values);
       }
       case CallCode::get_continuous_states: {

@@ -27,7 +27,7 @@ const std::vector<FuzzedGame>& fuzzed_games() {
   static const std::vector<FuzzedGame> games = [] {
     std::vector<FuzzedGame> read;
     for (const char* name : {"two_scalar_players", "vector_centers", "small_weight_bound", "five_vehicles",
-                             "interleaved_orders", "switching"}) {
+                             "interleaved_orders", "switching", "one_player", "external_plant"}) {
       read.emplace_back(name);
     }
     return read;

@@ -20,7 +20,7 @@ struct FuzzedGame {
 };
 
 /// Of different sizes: one and two coordinates, two to six players, one to eleven neurons, weights that reach the
-/// sphere.
+/// sphere, controls that reach their bounds, a player apart, a plant outside.
 const std::vector<FuzzedGame>& fuzzed_games();
 
 /// An instance whose messages are counted; null when fmi2Instantiate refused it.
