@@ -42,6 +42,7 @@ def build(
     """
     from ..files.writing import FMU
     from ..fmu.build import build_fmu, game_file
+    from ..fmu.model import read_model
     from ..fmu.parts import build_part, notes_of_parts
 
     source = game_file(game)
@@ -53,5 +54,5 @@ def build(
             source, players_of_text(player, "--player"), output, arm_linux=arm_linux, force=force
         )
     typer.echo(made)
-    for told in notes_of_parts(made):
+    for told in notes_of_parts(read_model(made)):
         note(told)

@@ -45,6 +45,7 @@ def serve(game: Path | str | None, *, port: int | None, ready: Callable[[str], o
     Raises what Simulator raises, MixedOrderGameError if the port cannot be had.
     """
     with Simulator(game) as simulator:
+        simulator.model.require_plants()
         worker = Worker(simulator, "" if game is None else str(game))
         try:
             asyncio.run(_serve(worker, port, ready))

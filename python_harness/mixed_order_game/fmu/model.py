@@ -125,17 +125,21 @@ class Model:
             n for n, player in enumerate(self.game["player"], 1) if player.get("plant") == "external"
         )
 
-    def require_whole(self) -> None:
-        """Raises ModelError for an FMU that waits for players or plants outside."""
+    def require_all_players(self) -> None:
+        """Raises ModelError for an FMU that waits for players outside."""
         if self.elsewhere:
             raise ModelError(
                 f"{self.path} holds a part of a game: player {self.elsewhere[0]} is elsewhere; "
                 "mog ssp connects the parts"
             )
+
+    def require_plants(self) -> None:
+        """Raises ModelError for an FMU that waits for plants outside."""
         if self.external:
+            number = self.external[0]
             raise ModelError(
-                f"{self.path} waits for the plant of player {self.external[0]}, which is external: "
-                "connect it in a tool"
+                f"{self.path} waits for the plant of player {number}, which is external: connect it in a "
+                f"tool, or give Python's run plant={{{number}: f}}"
             )
 
     @cached_property
@@ -158,13 +162,17 @@ class Model:
     def signals(self, *, estimates: bool = False) -> list[str]:
         """Names of what a run records unless told otherwise: outputs, locals and x_star.
 
-        Left out are the weights W, all time derivatives and, unless wanted, the estimates y.
+        Left out are the weights W, all time derivatives and, unless wanted, the estimates y. x and v of
+        external plants, which are inputs, are among them.
         """
         left_out = ("W",) if estimates else ("W", "y")
         return [
             variable.name
             for variable in self.variables.values()
-            if variable.causality in ("output", "local", "calculatedParameter")
+            if (
+                variable.causality in ("output", "local", "calculatedParameter")
+                or (variable.causality == "input" and parse_name(variable.name)[0] in ("x", "v"))
+            )
             and variable.variability != "constant"
             and parse_name(variable.name)[0] not in left_out
             and not variable.name.startswith("der(")

@@ -122,12 +122,12 @@ def longest_sampled_step(model: Model) -> dict[int, float]:
     }
 
 
-def notes_of_parts(fmu: Path) -> list[str]:
+def notes_of_parts(model: Model) -> list[str]:
     """What a user of an FMU with external plants has to know about its communication step."""
     return [
         f"player {number}: the loop through the external plant is stable only for communication steps below "
         f"{step:.2g} s"
-        for number, step in longest_sampled_step(read_model(fmu)).items()
+        for number, step in longest_sampled_step(model).items()
     ]
 
 

@@ -15,7 +15,7 @@ from itertools import pairwise
 from pathlib import Path
 from threading import Lock
 from types import TracebackType
-from typing import Any, Protocol, Self, cast
+from typing import Any, Protocol, Self
 
 import fmpy
 import numpy as np
@@ -29,27 +29,26 @@ from fmpy.fmi2 import (
     fmi2True,
     fmi2Warning,
 )
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from ..arguments import array_argument, number_argument
+from ..arguments import number_argument
 from ..errors import ExperimentError, SimulationError
-from ..files.temporary import explained, new_folder
+from ..files.temporary import explained, new_folder, temporary_folder
+from ..game.parts import toml_of_game
 from ..interrupts import noted_signals
-from ..names import split_names
+from ..names import parse_name, split_names
 from ..results.metrics import JUDGED, final_begin
 from ..results.result import Result
 from ..times import in_seconds
 from ..version import package_version
-from .build import GameSource
+from .build import GameSource, cached_fmu
+from .inputs import Feedback, Inputs, NoInputs, disturbance_of, on_samples
 from .model import Model, Value, Variable, check_value, read_model
-from .schedule import Disturbance
+from .parts import notes_of_parts
+from .plants import PlantFunctions, Plants, initial_states, with_plants_outside
 from .turn import Turn, in_turn
 
 logger = logging.getLogger(__name__)
-
-Inputs = Disturbance | Callable[[float], ArrayLike] | ArrayLike
-"""External disturbance d_ext: rows over time, a function of the time in s giving
-(N, D), or an array (N, D) or (T, N, D)."""
 
 Changes = Mapping[float, Mapping[str, Value]]
 """Tunable parameters and inputs to set during the run: time in s -> name -> value."""
@@ -74,6 +73,8 @@ def run(
     tolerance: float = 1e-6,
     outputs: Sequence[str] | None = None,
     inputs: Inputs | None = None,
+    feedback: Feedback | None = None,
+    plant: Plants | None = None,
     changes: Changes | None = None,
     progress: Progress | None = None,
     fine_start: bool = False,
@@ -105,6 +106,18 @@ def run(
         External disturbance d_ext: a function of the time in s giving (N, D), or an array (N, D) or (T, N, D)
         with one row a sample, each held over each communication step at the value of its beginning; or a
         `schedule.Disturbance`, whose rows act exactly at their times, held or straight between them.
+    feedback
+        Unknown dynamics g(t, x, v) besides the game's own, as a function, carried by d_ext: of the time in s
+        and all players' x and v (N, D), v NaN for order 1, giving (N, D); or functions of single players by
+        1-based number, giving (D,). Asked as often as `tolerance` wants it, straight in between; a jump is
+        met within `step` / 500.
+    plant
+        Plants by 1-based player, as functions f(t, x, v, u) -> rate: t in s; x, v and u are the player's own
+        action, velocity and control, (D,) each, v NaN for order 1; the rate (D,) is that of x for order 1, of
+        v for order 2. It replaces the plant of the game: the player's dynamics and disturbance are left out,
+        x0 and v0 are where it starts, u_max is refused (bound u in the function). It is integrated together
+        with the FMU to `tolerance`, whatever `step` is; one whose rate jumps to and fro with x, v or u, as
+        -sign(v) does, ends in an error.
     changes
         Tunable parameters and inputs set on the way: time in s -> name -> value, each before the step that
         begins at its time. A sample at the time of a change is taken before it.
@@ -146,6 +159,8 @@ def run(
             tolerance=tolerance,
             outputs=outputs,
             inputs=inputs,
+            feedback=feedback,
+            plant=plant,
             changes=changes,
             progress=progress,
             fine_start=fine_start,
@@ -175,7 +190,9 @@ class Simulator:
 
     def __init__(self, fmu: GameSource = None) -> None:
         self.model: Model = read_model(fmu)
-        self.model.require_whole()
+        self.model.require_all_players()
+        self._outside: dict[tuple[int, ...], Simulator] = {}
+        self._initial: Mapping[str, Value] = {}  # of plants that a game has and functions replace
         self._messages: list[tuple[int, str]] = []
         self._turn = Turn()
         self._process = os.getpid()
@@ -233,6 +250,9 @@ class Simulator:
 
     @in_turn
     def _free(self) -> None:
+        for simulator in self._outside.values():
+            simulator.close()
+        self._outside.clear()
         if self._slave is not None:
             self._slave.freeInstance()
             self._slave = None
@@ -250,6 +270,8 @@ class Simulator:
         tolerance: float = 1e-6,
         outputs: Sequence[str] | None = None,
         inputs: Inputs | None = None,
+        feedback: Feedback | None = None,
+        plant: Plants | None = None,
         changes: Changes | None = None,
         progress: Progress | None = None,
         fine_start: bool = False,
@@ -280,6 +302,18 @@ class Simulator:
             (T, N, D) with one row a sample, each held over each communication step at the value of its
             beginning; or a `schedule.Disturbance`, whose rows act exactly at their times, held or straight
             between them.
+        feedback
+            Unknown dynamics g(t, x, v) besides the game's own, as a function, carried by d_ext: of the time
+            in s and all players' x and v (N, D), v NaN for order 1, giving (N, D); or functions of single
+            players by 1-based number, giving (D,). Asked as often as `tolerance` wants it, straight in
+            between; a jump is met within `step` / 500.
+        plant
+            Plants by 1-based player, as functions f(t, x, v, u) -> rate: t in s; x, v and u are the player's
+            own action, velocity and control, (D,) each, v NaN for order 1; the rate (D,) is that of x for
+            order 1, of v for order 2. It replaces the plant of the game: the player's dynamics and
+            disturbance are left out, x0 and v0 are where it starts, u_max is refused (bound u in the
+            function). It is integrated together with the FMU to `tolerance`, whatever `step` is; one whose
+            rate jumps to and fro with x, v or u, as -sign(v) does, ends in an error.
         changes
             Tunable parameters and inputs set on the way: time in s -> name -> value, each before the step
             that begins at its time. A sample at the time of a change is taken before it.
@@ -300,6 +334,21 @@ class Simulator:
         SimulationError
             For whatever the FMU refuses, and for times, shapes and tolerances that make no sense.
         """
+        if plant is not None and (numbers := self._replaced(plant)) != self.model.external:
+            return self._with_plants_outside(numbers).run(
+                start_values=start_values,
+                stop_time=stop_time,
+                start_time=start_time,
+                step=step,
+                tolerance=tolerance,
+                outputs=outputs,
+                inputs=inputs,
+                feedback=feedback,
+                plant=plant,
+                changes=changes,
+                progress=progress,
+                fine_start=fine_start,
+            )
         if stop_time is None:
             stop_time = number_argument(start_time, "start_time", ExperimentError) + self.model.stop_time
         start_time, stop_time, step, tolerance = (
@@ -316,22 +365,32 @@ class Simulator:
             time = _with_fine_start(time)
         if not (np.isfinite(tolerance) and 0.0 < tolerance < 1.0):
             raise ExperimentError(f"tolerance = {tolerance:g} is not between 0 and 1")
-        start = self.model.expanded(start_values or {})
+        start = self._start_of(start_values or {})
         judging = {} if "judge_from" in start else {"judge_from": final_begin(start_time, stop_time, None)}
-        parameters = self.model.start_values({**start, **judging})
+        first = {**self._initial, **start, **judging}
+        parameters = self.model.start_values(first)
         schedule = _schedule(self.model, changes or {}, time)
-        disturbance = _disturbance(self.model, inputs, time)
-        if inputs is not None:
-            _check_set_once(self.model, [start, *schedule.values()])
+        own_tolerance = self._tolerance(first, tolerance)
+        disturbance = disturbance_of(self.model, inputs, time, feedback, own_tolerance)
+        if inputs is not None or feedback is not None:
+            by = "inputs" if feedback is None else "feedback"
+            _check_set_once(self.model, [start, *schedule.values()], ("d_ext",), by)
+        plants = None
+        if plant is not None:
+            plants = PlantFunctions(self.model, plant, own_tolerance)
+            for told in notes_of_parts(self.model):
+                logger.info("coupled by a tool, %s", told)
+            _check_set_once(self.model, schedule.values(), ("x", "v"), "plant")
         recorder = _Columns(self._recorded(outputs), len(time))
         begin = clock.perf_counter()
         messages = self._walk(
             time,
             recorder,
-            values={name: parameters[name] for name in (*start, *judging)},
+            values={name: parameters[name] for name in first},
             tolerance=tolerance,
             schedule=schedule,
             disturbance=disturbance,
+            plants=plants,
             progress=progress,
         )
         logger.info(
@@ -345,12 +404,88 @@ class Simulator:
             time,
             recorder.columns(),
             parameters=parameters,
-            changed=self.model.changed_values(self.model.start_values(start)),
+            changed={
+                name: value
+                for name, value in self.model.changed_values(self.model.start_values(start)).items()
+                if value != self._initial.get(name)
+            },
             step=step,
             tolerance=tolerance,
             stop_time=stop_time,
             messages=messages,
         )
+
+    def _ready(self, plants: PlantFunctions | None = None) -> Any:
+        """The instance. Raises SimulationError if it is closed, ModelError if plants are missing."""
+        if self._slave is None:
+            raise SimulationError("the simulator is closed")
+        if plants is None:
+            self.model.require_plants()
+        return self._slave
+
+    def _advance(
+        self, begin: float, end: float, disturbance: NoInputs | None, plants: PlantFunctions | None
+    ) -> None:
+        """From one communication point to the next, and to those in between that the disturbance wants."""
+        while begin < end:
+            until = end if disturbance is None else disturbance.until(begin, end)
+            if plants is None:
+                self._slave.fmi2DoStep(self._slave.component, begin, until - begin, fmi2True)
+            else:
+                plants.advance(begin, until)
+            begin = until
+            if disturbance is not None and begin < end:
+                disturbance.set(self._slave, begin)
+
+    def _replaced(self, plant: Plants) -> tuple[int, ...]:
+        """The players whose plants are functions. Raises ExperimentError for what are no such players."""
+        if not isinstance(plant, Mapping):
+            raise ExperimentError(f"plant is {plant!r}, expected functions by player, as in {{4: f}}")
+        for number, function in plant.items():
+            if isinstance(number, bool) or number not in range(1, self.model.players + 1):
+                raise ExperimentError(
+                    f"plant has the player {number!r}, expected a number from 1 to {self.model.players}"
+                )
+            if not callable(function):
+                raise ExperimentError(f"the plant of player {number} is {function!r}, expected a function")
+        for number in self.model.external:
+            if number not in plant:
+                raise ExperimentError(f"plant has no function of player {number}, whose plant is external")
+        return tuple(sorted(plant))
+
+    def _with_plants_outside(self, numbers: tuple[int, ...]) -> "Simulator":
+        """A simulator of the same game in which these players' plants are external."""
+        if numbers not in self._outside:
+            with temporary_folder(SimulationError) as folder:
+                game = folder / "game.toml"
+                game.write_text(toml_of_game(with_plants_outside(self.model.game, numbers)), encoding="utf-8")
+                simulator = Simulator(cached_fmu(game))
+            own = [number for number in numbers if number not in self.model.external]
+            simulator._initial = initial_states(self.model.game, own)
+            self._outside[numbers] = simulator
+        return self._outside[numbers]
+
+    def _start_of(self, values: Mapping[str, Value]) -> dict[str, Value]:
+        """Start values by single variables; x0 and v0 of a plant that is a function are those of x and v."""
+        start: dict[str, Value] = {}
+        names = {f"{stem}0{name[1:]}": name for name in self._initial for stem in (name[0],)}
+        for name, value in values.items():
+            stem, index = parse_name(name)
+            if name in names:
+                start[names[name]] = value
+            elif not index and stem in ("x0", "v0"):
+                start |= {own: value for key, own in names.items() if key.startswith(stem)}
+                if self.model.indexed(stem):
+                    start[name] = value
+            else:
+                start[name] = value
+        return self.model.expanded(start)
+
+    @staticmethod
+    def _tolerance(start: Mapping[str, Value], tolerance: float) -> float:
+        """That of the FMU."""
+        own = start.get("tolerance_relative")
+        return float(own) if own else tolerance
 
     @in_turn
     def walk(
@@ -370,7 +505,7 @@ class Simulator:
         """
         start = self.model.expanded(values)
         checked = {name: check_value(self.model.variable(name), value) for name, value in start.items()}
-        disturbance = _disturbance(self.model, inputs, time)
+        disturbance = disturbance_of(self.model, inputs, time)
         return self._walk(time, recorder, values=checked, tolerance=tolerance, disturbance=disturbance)
 
     def _walk(
@@ -381,12 +516,11 @@ class Simulator:
         values: Mapping[str, Value],
         tolerance: float,
         schedule: "Mapping[float, Mapping[str, Value]] | None" = None,
-        disturbance: "_Inputs | None" = None,
+        disturbance: NoInputs | None = None,
+        plants: PlantFunctions | None = None,
         progress: Progress | None = None,
     ) -> tuple[str, ...]:
-        slave = self._slave
-        if slave is None:
-            raise SimulationError("the simulator is closed")
+        slave = self._ready(plants)
         schedule = schedule or {}
         asked = [] if disturbance is None else disturbance.times
         points = np.union1d(time, [*schedule, *asked]).tolist()
@@ -397,16 +531,18 @@ class Simulator:
                 if disturbance is not None:
                     disturbance.set(slave, points[0])
                 slave.exitInitializationMode()
+                if plants is not None:
+                    plants.begin(slave, points[0])
                 read = recorder.reader(slave)
                 read(0)
-                sample, step, component = 1, slave.fmi2DoStep, slave.component
+                sample = 1
                 for begin, end in pairwise(points):
                     take_signals()
                     if disturbance is not None:
                         disturbance.set(slave, begin)
                     if begin in schedule:
                         self._set(schedule[begin])
-                    step(component, begin, end - begin, fmi2True)
+                    self._advance(begin, end, disturbance, plants)
                     if end == samples[sample]:
                         read(sample)
                         sample += 1
@@ -445,8 +581,7 @@ class Simulator:
     @contextmanager
     def _initialized(self, values: Mapping[str, Value]) -> Iterator[Any]:
         """The instance at the start of a run; what the FMU refuses becomes SimulationError."""
-        if self._slave is None:
-            raise SimulationError("the simulator is closed")
+        self._ready()
         start = self.model.expanded(values)
         checked = {name: check_value(self.model.variable(name), value) for name, value in start.items()}
         try:
@@ -583,97 +718,6 @@ class _Columns:
         return {variable.name: columns[variable.name] for variable in self._variables}
 
 
-class _Inputs:
-    """The external disturbance d_ext at the communication points; this one is none."""
-
-    def __init__(self, model: Model, times: Sequence[float] = ()) -> None:
-        self.times = times  # communication points that the disturbance asks for
-        self._shape = (model.players, model.dimension)
-        names = model.indexed("d_ext")
-        self._references = _references([names[index] for index in sorted(names)])
-        self._buffer = (c_double * len(names))()
-
-    def set(self, slave: Any, time: float) -> None:
-        """Set the inputs for the step that begins at a communication point."""
-
-    def _give(self, slave: Any, values: NDArray[np.float64]) -> None:
-        self._buffer[:] = cast("Any", values.ravel().tolist())
-        slave.fmi2SetReal(slave.component, self._references, len(self._buffer), self._buffer)
-
-
-class _Function(_Inputs):
-    """A function of the time in s, asked at every communication point."""
-
-    def __init__(self, model: Model, function: Callable[[float], ArrayLike]) -> None:
-        super().__init__(model)
-        self._function = function
-
-    def set(self, slave: Any, time: float) -> None:
-        value = array_argument(self._function(time), f"inputs({time:.15g})", ExperimentError)
-        if value.shape != self._shape:
-            raise ExperimentError(f"inputs({time:.15g}) has the shape {value.shape}, not {self._shape}")
-        _check_finite(value, f"inputs({time:.15g})")
-        self._give(slave, value)
-
-
-class _Rows(_Inputs):
-    """Rows (T, N, D), each held from its time on, or changing at a rate (T, N, D) until the next one."""
-
-    def __init__(
-        self,
-        model: Model,
-        times: Sequence[float],
-        values: NDArray[np.float64],
-        rates: NDArray[np.float64] | None = None,
-    ) -> None:
-        super().__init__(model, times)
-        self._rows = dict(zip(times, range(len(times)), strict=True))
-        self._values = values
-        self._rates = rates
-        self._orders = (c_int * len(self._buffer))(*[1] * len(self._buffer))
-
-    def set(self, slave: Any, time: float) -> None:
-        row = self._rows.get(time)
-        if row is None:
-            return
-        self._give(slave, self._values[row])
-        if self._rates is not None:
-            self._buffer[:] = cast("Any", self._rates[row].ravel().tolist())
-            slave.fmi2SetRealInputDerivatives(
-                slave.component, self._references, len(self._buffer), self._orders, self._buffer
-            )
-
-
-def _disturbance(model: Model, inputs: Inputs | None, samples: NDArray[np.float64]) -> _Inputs:
-    """The inputs of a run, their shapes and values checked as far as they are known."""
-    if inputs is None:
-        return _Inputs(model)
-    shape = (model.players, model.dimension)
-    if isinstance(inputs, Disturbance):
-        return _rows_of(model, inputs, samples)
-    if callable(inputs):
-        return _Function(model, inputs)
-    array = array_argument(inputs, "inputs", ExperimentError)
-    if array.shape not in (shape, (len(samples), *shape)):
-        raise ExperimentError(f"inputs has the shape {array.shape}, not {shape} or {(len(samples), *shape)}")
-    _check_finite(array, "inputs")
-    return _Rows(model, samples.tolist(), np.broadcast_to(array, (len(samples), *shape)))
-
-
-def _rows_of(model: Model, inputs: Disturbance, samples: NDArray[np.float64]) -> _Rows:
-    """What is in force at the start, and every row between start and stop."""
-    shape = (model.players, model.dimension)
-    if inputs.values.shape[1:] != shape:
-        raise ExperimentError(f"a row of inputs has the shape {inputs.values.shape[1:]}, not {shape}")
-    times = _on_samples(inputs.time, samples)
-    last = np.diff(times, append=np.inf) > 0.0  # of rows that rounding put on one sample
-    moved = Disturbance(times[last], inputs.values[last], inputs.linear)
-    start, stop = samples[[0, -1]]
-    points = [float(start), *moved.time[(start < moved.time) & (moved.time < stop)].tolist()]
-    values, rates = zip(*map(moved.at, points), strict=True)
-    return _Rows(model, points, np.array(values), np.array(rates) if inputs.linear else None)
-
-
 def _samples(start: float, stop: float, step: float) -> NDArray[np.float64]:
     """Times start, start + step, ..., stop."""
     if not (np.isfinite(start) and np.isfinite(stop) and start < stop):
@@ -711,7 +755,7 @@ def _schedule(model: Model, changes: Changes, samples: NDArray[np.float64]) -> d
     start, stop = float(samples[0]), float(samples[-1])
     times = {number_argument(when, "the time of a change", ExperimentError): when for when in changes}
     when = np.array(sorted(times), dtype=np.float64)
-    for time, point in zip(when.tolist(), _on_samples(when, samples).tolist(), strict=True):
+    for time, point in zip(when.tolist(), on_samples(when, samples).tolist(), strict=True):
         if not start <= point < stop:
             raise ExperimentError(
                 f"the change at {in_seconds(time)} is outside [{start:.15g}, {stop:.15g}) s"
@@ -724,28 +768,15 @@ def _schedule(model: Model, changes: Changes, samples: NDArray[np.float64]) -> d
     return schedule
 
 
-def _on_samples(times: NDArray[np.float64], samples: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The times, those of a sample put right where rounding has moved them."""
-    after = np.clip(np.searchsorted(samples, times), 1, len(samples) - 1)
-    before = after - 1
-    nearest = np.where(times - samples[before] < samples[after] - times, samples[before], samples[after])
-    span, largest = samples[-1] - samples[0], np.abs(samples).max()
-    slack = 1e-9 * span + 4.0 * np.spacing(largest)
-    return np.where(np.abs(times - nearest) <= slack, nearest, times)
-
-
-def _check_set_once(model: Model, values: Iterable[Mapping[str, Value]]) -> None:
-    inputs = {variable.name for variable in model.indexed("d_ext").values()}
+def _check_set_once(
+    model: Model, values: Iterable[Mapping[str, Value]], stems: Sequence[str], by: str
+) -> None:
+    inputs = {variable.name for stem in stems for variable in model.indexed(stem).values()}
     twice = next((name for each in values for name in each if name in inputs), None)
     if twice is not None:
-        raise ExperimentError(f"{twice} is set twice: by inputs and by start_values or changes")
+        raise ExperimentError(f"{twice} is set twice: by {by} and by start_values or changes")
 
 
 def _references(variables: Iterable[Variable]) -> Any:
     numbers = [variable.reference for variable in variables]
     return (c_uint * len(numbers))(*numbers)
-
-
-def _check_finite(array: NDArray[np.float64], name: str) -> None:
-    if not np.all(np.isfinite(array)):
-        raise ExperimentError(f"{name} must be finite")
