@@ -26,6 +26,9 @@ from .results.result import load as load
 from .studies.claims.verdict import Claim as Claim
 from .studies.claims.verdict import Verdict as Verdict
 from .studies.compare import compare as compare
+from .studies.periods import Period as Period
+from .studies.periods import Periods as Periods
+from .studies.periods import periods as periods
 from .studies.sweep.conduct import sweep as sweep
 from .studies.sweep.definition import Sweep as Sweep
 from .studies.tune import tune as tune

@@ -23,6 +23,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mixed_order_game import read_model
+from mixed_order_game.fmu.coupled import Coupled
+from mixed_order_game.fmu.run import samples
 from tests.games_by_hand import BY_HAND
 from tests.oracle.general_loop import GeneralLoop
 
@@ -47,6 +49,10 @@ EXPRESSIONS = "cournot_isoelastic"
 
 COUPLED_STEPS = (0.01, 0.005, 0.0025)
 """Communication steps of coupled FMUs, s."""
+
+PERIODS = (0.02, 0.05, 0.2)
+"""Periods in s at which coupled FMUs are to do what they do in our master."""
+SAME = 1e-9
 
 FloatArray = NDArray[np.float64]
 Columns = Mapping[str, FloatArray]
@@ -333,8 +339,20 @@ def coupled(command: Sequence[object]) -> str:
         differences.append(float(np.abs([found[name][-1] for name in names] - expected.ravel()).max()))
     if not all(fine < 0.6 * coarse for coarse, fine in pairwise(differences)):
         raise FindingError(f"the difference from the oracle does not fall with the step: {differences}")
-    steps = ", ".join(f"{1000.0 * step:g}" for step in COUPLED_STEPS)
-    return f"within {', '.join(map(one_digit, differences))} of the oracle, steps of {steps} ms"
+    apart = []
+    with Coupled("five_vehicles") as ours:
+        for period in PERIODS:
+            run([*command, ssp, stop, period, results, *names])
+            found = columns(results)
+            here = ours.run(samples(0.0, stop, period))[-1].ravel()
+            apart.append(float(np.abs([found[name][-1] for name in names] - here).max()))
+    if max(apart) > SAME:
+        raise FindingError(f"differs from our master with periods of {PERIODS} s: {apart}")
+    steps, periods = (", ".join(f"{1000.0 * step:g}" for step in each) for each in (COUPLED_STEPS, PERIODS))
+    return (
+        f"within {', '.join(map(one_digit, differences))} of the oracle, steps of {steps} ms; "
+        f"within {one_digit(max(apart))} of `mog periods`, periods of {periods} ms"
+    )
 
 
 def run(command: Sequence[object], folder: Path | None = None) -> str:

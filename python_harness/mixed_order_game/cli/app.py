@@ -23,6 +23,7 @@ from .explore import explore
 from .info import info
 from .new import new
 from .panels import grouped
+from .periods import periods
 from .plot import plot
 from .report import report
 from .run import run
@@ -84,7 +85,7 @@ def root(
 COMMANDS = {
     "Run and show": (demo, run, explore, plot, report),
     "Judge": (validate, analyse, compare),
-    "Many runs": (sweep, tune),
+    "Many runs": (sweep, tune, periods),
     "Games": (new, check, schema, info),
     "FMUs": (build, ssp),
 }

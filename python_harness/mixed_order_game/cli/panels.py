@@ -14,10 +14,10 @@ PANELS = {
     ),
     "What is varied": (
         "design", "gains", "graphs", "grid", "initial_actions", "initial_states",
-        "initial_velocities", "ranges", "samples", "seed",
+        "initial_velocities", "period", "ranges", "samples", "seed",
     ),
     "The run": (
-        "jobs", "limit", "restart", "scheduler", "simulation", "start_time", "step", "stop_time",
+        "jobs", "limit", "restart", "scheduler", "search", "simulation", "start_time", "step", "stop_time",
         "tolerance",
     ),
     "What it is judged by": (

@@ -188,9 +188,10 @@ class Simulator:
     Raises what read_model raises, SimulationError if the FMU cannot be loaded on this machine.
     """
 
-    def __init__(self, fmu: GameSource = None) -> None:
+    def __init__(self, fmu: GameSource = None, *, part: bool = False) -> None:
         self.model: Model = read_model(fmu)
-        self.model.require_all_players()
+        if not part:
+            self.model.require_all_players()
         self._outside: dict[tuple[int, ...], Simulator] = {}
         self._initial: Mapping[str, Value] = {}  # of plants that a game has and functions replace
         self._messages: list[tuple[int, str]] = []
@@ -360,7 +361,7 @@ class Simulator:
                 ("tolerance", tolerance),
             )
         )
-        time = _samples(start_time, stop_time, step)
+        time = samples(start_time, stop_time, step)
         if fine_start:
             time = _with_fine_start(time)
         if not (np.isfinite(tolerance) and 0.0 < tolerance < 1.0):
@@ -718,7 +719,7 @@ class _Columns:
         return {variable.name: columns[variable.name] for variable in self._variables}
 
 
-def _samples(start: float, stop: float, step: float) -> NDArray[np.float64]:
+def samples(start: float, stop: float, step: float) -> NDArray[np.float64]:
     """Times start, start + step, ..., stop."""
     if not (np.isfinite(start) and np.isfinite(stop) and start < stop):
         raise ExperimentError(f"stop_time = {in_seconds(stop)} is not after start_time = {in_seconds(start)}")
