@@ -135,21 +135,10 @@ class Game:
     def plot(self, axes: "Axes | None" = None, *, width: float = 3.5) -> "Axes":
         """Draw the communication graph.
 
-        Parameters
-        ----------
-        axes
-            Matplotlib axes to draw into; a figure of its own when left out.
-        width
-            Width of a figure of its own in inches.
-
-        Returns
-        -------
-        matplotlib.axes.Axes
+        Parameters, what is returned and the need of Matplotlib are as for `Result.plot`.
 
         Raises
         ------
-        MissingPackageError
-            If Matplotlib is not installed.
         GameError
             For a game that breaks the definition of one.
         """

@@ -91,21 +91,10 @@ class Comparison:
     def plot(self, axes: "Axes | None" = None, *, width: float = 3.5) -> "Axes":
         """Draw the distances to the equilibrium over time, on a logarithmic axis.
 
-        Parameters
-        ----------
-        axes
-            Matplotlib axes to draw into; a figure of its own when left out.
-        width
-            Width of a figure of its own in inches.
-
-        Returns
-        -------
-        matplotlib.axes.Axes
+        Parameters, what is returned and the need of Matplotlib are as for `Result.plot`.
 
         Raises
         ------
-        MissingPackageError
-            If Matplotlib is not installed.
         ResultError
             If nash_error was not recorded.
         """

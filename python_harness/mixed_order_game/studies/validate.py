@@ -72,21 +72,10 @@ class Validation:
     def plot(self, axes: "Axes | None" = None, *, width: float = 3.5) -> "Axes":
         """Draw the distance to the equilibrium of the runs that were judged, on a logarithmic axis.
 
-        Parameters
-        ----------
-        axes
-            Matplotlib axes to draw into; a figure of its own when left out.
-        width
-            Width of a figure of its own in inches.
-
-        Returns
-        -------
-        matplotlib.axes.Axes
+        Parameters, what is returned and the need of Matplotlib are as for `Result.plot`.
 
         Raises
         ------
-        MissingPackageError
-            If Matplotlib is not installed.
         PlotError
             If no run came to its end.
         """

@@ -85,19 +85,11 @@ class SweepResult:
             Columns that vary in the sweep, such as "k1".
         value
             The figure, one of the columns after them, such as "settling_time".
-        axes
-            Matplotlib axes to draw into; a figure of its own when left out.
-        width
-            Width of a figure of its own in inches.
-
-        Returns
-        -------
-        matplotlib.axes.Axes
+        axes, width
+            As for `Result.plot`, and so are what is returned and the need of Matplotlib.
 
         Raises
         ------
-        MissingPackageError
-            If Matplotlib is not installed.
         ResultError
             For a column that does not exist.
         PlotError
