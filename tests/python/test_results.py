@@ -35,7 +35,7 @@ def make(**options: object) -> Result:
     columns["nash_error"] = np.geomspace(1.0, 1e-300, T)
     columns["solver_steps"] = np.arange(T) * 1e9
     values: dict[str, object] = {
-        "units": {"v[2,1]": "1/s"},
+        "units": {"v[2,1]": "1/s", "u[1,1]": "1/s", "u[2,1]": "1/s2", "u[2,2]": "1/s2"},
         "parameters": {"k1": 0.1, "robust": True, "a[1,2]": 1.0},
         "title": "three players",
         "guid": "{1}",
@@ -135,6 +135,7 @@ def test_to_xarray() -> None:
     assert dataset.y.dims == ("time", "player", "estimated_player", "coordinate")
     np.testing.assert_array_equal(dataset.x.sel(player=3, coordinate=2), make()["x[3,2]"])
     assert dataset.v.attrs["units"] == "1/s"
+    assert dataset.u.attrs["units"] == "1/s or 1/s2"
     assert dataset.attrs["guid"] == "{1}"
 
 

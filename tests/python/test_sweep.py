@@ -11,16 +11,18 @@ from pathlib import Path
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
+from matplotlib.colors import LogNorm
 
 from mixed_order_game import MixedOrderGameError, ModelError, PlotError, ResultError, VariableError
 from mixed_order_game.game.graphs import GraphError, graphs_of_text
+from mixed_order_game.results.style import new_axes
 from mixed_order_game.studies.designs import DesignError, Range
 from mixed_order_game.studies.pool import PoolError
 from mixed_order_game.studies.sampler import Sampler, Settings
 from mixed_order_game.studies.sampling import Sampling
 from mixed_order_game.studies.sweep.conduct import connected_graphs_example, sweep
 from mixed_order_game.studies.sweep.definition import Sweep
-from mixed_order_game.studies.sweep.figures import check_heat_map, plot_edges, plot_heat_map
+from mixed_order_game.studies.sweep.figures import _image, check_heat_map, plot_edges, plot_heat_map
 from mixed_order_game.studies.sweep.store import SweepError
 from mixed_order_game.studies.sweep.table import SweepResult, load_sweep
 from tests.python import sweep_workers
@@ -312,6 +314,23 @@ def test_heat_maps(swept: SweepResult, tmp_path: Path) -> None:
     assert not np.isnan(array[0, 1])
     with pytest.raises(PlotError, match="does not vary"):
         plot_heat_map(one_k1(swept), "k1", "k2", "events")
+
+
+@pytest.mark.parametrize(
+    ("values", "logarithmic", "ticks"),
+    [([0.5, 0.5, 0.5], False, [0.5]), ([1.0, 3.0, 9.0], False, None), ([1.0, 3.0, 20.0], True, None)],
+)
+def test_colours_of_heat_maps(values: list[float], *, logarithmic: bool, ticks: list[float] | None) -> None:
+    """Logarithmic beyond a decade; one tick for one value; cells without a value are explained."""
+    axes = new_axes()
+    _image(axes, np.array([[*values, np.nan]]), "final_error")
+    (image,) = axes.images
+    assert isinstance(image.norm, LogNorm) == logarithmic
+    assert image.colorbar is not None
+    assert ticks is None or image.colorbar.get_ticks().tolist() == ticks
+    legend = axes.get_legend()
+    assert legend is not None
+    assert [text.get_text() for text in legend.get_texts()] == ["no value"]
 
 
 @pytest.mark.parametrize(

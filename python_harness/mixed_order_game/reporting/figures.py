@@ -575,6 +575,5 @@ def _styles(result: Result) -> str:
 
 def _unit(result: Result, stem: str) -> str:
     """The unit of a signal in brackets; nothing for a dimensionless one."""
-    found = indices_of(result.units, stem)
-    unit = result.units[next(iter(found.values()))] if found else ""
+    unit = result.unit(stem)
     return f" ({unit})" if unit not in ("", "1") else ""

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.patheffects import Normal, Stroke
 
 from .keys import label_ends, unit_of
 from .style import COLUMN_WIDTH, colours, legend_above, new_axes, paper_style
@@ -59,6 +60,7 @@ def plot_error(
                 color="0.35",
                 ha="right",
                 va="center",
+                path_effects=[Stroke(linewidth=1.8, foreground="white"), Normal()],
             )
         if handles:
             legend_above(axes, handles, names, columns=len(names))

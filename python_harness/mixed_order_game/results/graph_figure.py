@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..errors import PlotError
 from ..names import indices_of, parse_name
-from .style import COLUMN_WIDTH, colours, legend_above, new_axes, paper_style
+from .style import COLUMN_WIDTH, colours, legend_above, new_axes, paper_style, readable_on
 
 if TYPE_CHECKING:
     from .result import Result
@@ -78,7 +78,7 @@ def plot_graph(
                 axes.annotate(
                     str(i + 1),
                     places[i],
-                    color="white",
+                    color=readable_on(colour),
                     fontsize=0.55 * size,
                     ha="center",
                     va="center",

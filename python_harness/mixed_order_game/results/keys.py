@@ -11,7 +11,6 @@ from matplotlib.colors import Normalize
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
-from ..names import parse_name
 from .style import LINE_STYLES, MAP, MAP_END, PALETTE, TWO_COLUMNS, colours, legend_above, width_of
 
 if TYPE_CHECKING:
@@ -73,7 +72,8 @@ def colour_bar(axes: Axes, players: int, letter: str = "i") -> None:
         ScalarMappable(norm, shades), ax=axes, label=f"player ${letter}$", pad=0.02, aspect=30
     )
     bar.ax.set_ylim(1, players)
-    bar.ax.yaxis.set_major_locator(MaxNLocator(nbins=6, integer=True, steps=[1, 2, 5, 10]))
+    steps = MaxNLocator(nbins=6, integer=True, steps=[1, 2, 5, 10]).tick_values(1, players)
+    bar.set_ticks([1.0, *(step for step in steps if 1.0 < step <= players)])
     bar.outline.set_linewidth(0.4)
 
 
@@ -129,7 +129,6 @@ def spread(places: Sequence[float], apart: float) -> list[float]:
 
 def unit_of(result: "Result", stem: str, otherwise: str = "") -> str:
     """The unit of a signal in brackets; nothing for a dimensionless one."""
-    found = (unit for name, unit in result.units.items() if parse_name(name)[0] == stem)
-    unit = next(found, otherwise)
+    unit = result.unit(stem) or otherwise
     raised = re.sub(r"(?<=[A-Za-z])(\d)", r"$^\1$", unit)
     return f" ({raised})" if unit not in ("", "1") else ""

@@ -11,7 +11,16 @@ from numpy.typing import NDArray
 from ..errors import PlotError
 from .graph_figure import Edge, edges_of, is_directed
 from .keys import colour_bar, unit_of
-from .style import COLUMN_WIDTH, PALETTE, TWO_COLUMNS, colours, legend_above, new_axes, paper_style
+from .style import (
+    COLUMN_WIDTH,
+    PALETTE,
+    TWO_COLUMNS,
+    colours,
+    legend_above,
+    new_axes,
+    paper_style,
+    readable_on,
+)
 
 if TYPE_CHECKING:
     from .result import Result
@@ -45,7 +54,8 @@ def plot_plane(
         raise PlotError(f"paths are drawn in the plane: the game has {result.dimension} coordinates, not 2")
     x = result.x
     many = result.players > MOST_NAMED
-    size = 4.0 if many else 9.0
+    crowded = result.players > len(PALETTE) and width < TWO_COLUMNS
+    size = 4.0 if many else 7.5 if crowded else 9.0
     with paper_style():
         axes = axes or new_axes(width, height=0.95 * width)
         _draw_edges(axes, x[0], edges_of(result) if edges is None else edges, directed=is_directed(result))
@@ -54,7 +64,13 @@ def plot_plane(
             axes.plot(*x[0, i], color=colour, marker="o", markersize=size, linestyle="none", zorder=3)
             if not many:
                 axes.annotate(
-                    str(i + 1), x[0, i], color="white", fontsize=6.5, ha="center", va="center", zorder=4
+                    str(i + 1),
+                    x[0, i],
+                    color=readable_on(colour),
+                    fontsize=0.72 * size,
+                    ha="center",
+                    va="center",
+                    zorder=4,
                 )
         earlier = earlier_equilibria(result)
         axes.plot(*earlier.T, color=EARLIER, marker="x", markersize=5.0, linestyle="none", zorder=5)

@@ -218,6 +218,10 @@ class Result:
         """2-norm of x - x*, (T,), x* of the costs in force at each time."""
         return self["nash_error"]
 
+    def unit(self, stem: str) -> str:
+        """Unit of a signal, such as "1/s or 1/s2" for u of players of both orders; empty if none is known."""
+        return " or ".join(sorted({self.units[name] for name in indices_of(self.units, stem).values()}))
+
     def largest_error(self, begin: float = -np.inf, end: float = np.inf) -> float:
         """Largest |x_il - x*_il| over players, coordinates and the samples in [begin, end], in s."""
         return _largest(self.x - self.equilibria, self.window(begin, end))
@@ -337,7 +341,7 @@ class Result:
             found = indices_of(self.columns, stem)
             rank = len(next(iter(found)))
             if rank == 0:
-                arrays[stem] = ("time", self.columns[stem], {"units": self.units.get(stem, "")})
+                arrays[stem] = ("time", self.columns[stem], {"units": self.unit(stem)})
                 continue
             dimensions = SPECIAL_DIMENSIONS.get(stem, DIMENSIONS.get(rank))
             if dimensions is None:
@@ -345,8 +349,8 @@ class Result:
             sizes = {"player": self.players, "estimated_player": self.players, "coordinate": self.dimension}
             shape = [sizes.get(name) or max(i[k] for i in found) for k, name in enumerate(dimensions)]
             labels |= {name: np.arange(1, size + 1) for name, size in zip(dimensions, shape, strict=True)}
-            unit = self.units.get(next(iter(found.values())), "")
-            arrays[stem] = (("time", *dimensions), self._array(stem, tuple(shape)), {"units": unit})
+            values = self._array(stem, tuple(shape))
+            arrays[stem] = (("time", *dimensions), values, {"units": self.unit(stem)})
         dataset: xarray.Dataset = package.Dataset(arrays, coords=labels, attrs=self._metadata(flat=True))
         return dataset
 

@@ -7,6 +7,7 @@ from typing import Any, Literal, cast
 import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 
 COLUMN_WIDTH = 3.5
@@ -64,6 +65,14 @@ def colours(count: int) -> Sequence[Any]:
     if count <= len(PALETTE):
         return PALETTE[:count]
     return [MAP(value) for value in np.linspace(0.0, MAP_END, count)]
+
+
+def readable_on(colour: Any) -> str:
+    """Black or white for text on a colour, whichever has more contrast (WCAG 2, relative luminance)."""
+    sRGB = np.array(to_rgb(colour))
+    linear = np.where(sRGB <= 0.04045, sRGB / 12.92, ((sRGB + 0.055) / 1.055) ** 2.4)  # noqa: PLR2004
+    luminance = float(linear @ (0.2126, 0.7152, 0.0722))
+    return "black" if luminance > np.sqrt(1.05 * 0.05) - 0.05 else "white"
 
 
 def width_of(axes: Axes) -> float:

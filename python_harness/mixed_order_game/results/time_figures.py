@@ -3,7 +3,7 @@
 A transient that is short against the run is enlarged in an inset; the frame in the axes marks what it shows.
 """
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -44,13 +44,16 @@ MANY_POINTS = 50_000
 """Points of all lines from which they are pixels in a vector file, which else takes megabytes."""
 
 SOME_MARKS = 80
-"""Marks at the right edge up to which they have an outline."""
+"""Marks at the right edge up to which they are triangles."""
 
 FEW_LINES, SOME_LINES = 24, 120
 """Lines up to which they are drawn in full width, and in half of it."""
 
 MOST_ESTIMATING = 12
 """Most players whose estimates, N^2 D signals, are recorded to be drawn."""
+
+FAR_BELOW = 0.2
+"""Part of W_max below which weights are drawn without the line of it, which would leave them no height."""
 
 MOVED = 0.002
 """Part of the largest value by which one has moved when an axis of logarithmic time begins."""
@@ -125,7 +128,10 @@ def plot_weights(result: "Result", axes: Axes | None = None, *, width: float = C
         over_time(axes, "weight column $w'w$" + unit_of(result, "W_norm2"))
         bound = result.parameters.get("W_max")
         references = []
-        if bound is not None:
+        if bound is not None and np.nanmax(result.W_norm2) < FAR_BELOW * bound:
+            nothing = Line2D([], [], linestyle="none")
+            references.append((nothing, rf"$W_{{\max}} = {bound:g}$ lies above"))
+        elif bound is not None:
             line = axes.axhline(float(bound), color="black", linewidth=0.8, linestyle=(0, (1, 1)), zorder=4)
             references.append((line, r"$W_{\max}$"))
         axes.set_ylim(bottom=0.0)
@@ -217,21 +223,16 @@ def _equilibria(axes: Axes, result: "Result") -> list[tuple[Line2D, str]]:
     distinct, members = np.unique(levels, axis=1, return_inverse=True)
     palette = colours(result.players)
     if distinct.shape[1] > MOST_LEVELS:
+        # triangles that point left, from outside the axes; of very many players short lines
+        look: dict[str, Any] = {"marker": 4, "markersize": 4.0, "linestyle": "none"}
+        edge: dict[str, Any] = {"markeredgecolor": "black", "markeredgewidth": 0.25}
+        if len(owners) > SOME_MARKS:
+            look, edge = look | {"marker": 1, "markeredgewidth": 0.6}, {}
+        across = axes.get_yaxis_transform()
         for level, i in zip(levels[-1], owners, strict=True):
-            axes.plot(
-                [1.0],
-                [level],
-                transform=axes.get_yaxis_transform(),
-                color=palette[i],
-                marker=4,  # a triangle that points left, from outside the axes
-                markersize=4.0 if len(owners) <= SOME_MARKS else 2.0,
-                markeredgecolor="black",
-                markeredgewidth=0.25 if len(owners) <= SOME_MARKS else 0.0,
-                linestyle="none",
-                clip_on=False,
-                zorder=6,
-            )
-        return [(Line2D([], [], color="0.3", marker=4, markersize=4.0, linestyle="none"), "$x^*$ at the end")]
+            mark = look | edge | {"color": palette[i], "clip_on": False, "zorder": 6}
+            axes.plot([1.0], [level], transform=across, **mark)
+        return [(Line2D([], [], color="0.3", **look), "$x^*$ at the end")]
     for k, level in enumerate(distinct.T):
         whose = {owner for owner, member in zip(owners, members.ravel(), strict=True) if member == k}
         axes.plot(

@@ -6,12 +6,13 @@ import numpy as np
 import pyarrow as pa
 from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm, Normalize
+from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
 from ...errors import PlotError, ResultError
 from ...game.graphs import graph_of_text
 from ...results.metrics import METRIC_UNITS
-from ...results.style import COLUMN_WIDTH, new_axes, paper_style
+from ...results.style import COLUMN_WIDTH, legend_above, new_axes, paper_style
 from .definition import Sweep
 from .store import schema_of
 
@@ -24,8 +25,11 @@ LARGEST_EXACT = 24
 """Most values of a column that get a row or column of their own; more are put into bins."""
 
 BINS = 12
-WIDE = 100.0
+WIDE = 10.0
 """Ratio of the largest to the smallest value from which an axis or the colours are logarithmic."""
+
+UNKNOWN = "0.85"
+"""Colour of cells without a value: no run lies there, or none settled."""
 
 LABELS = {
     "settling_time": "settling time",
@@ -51,7 +55,8 @@ def plot_heat_map(
     """Median of the column value over the columns x and y; grey where no run has it. width in inches.
 
     Columns with more than 24 different values are put into 12 bins, equal in the logarithm if they span more
-    than two decades. Raises ResultError for a column that does not exist, PlotError if x and y do not vary.
+    than a decade, as colours then are. Raises ResultError for a column that does not exist, PlotError if x
+    and y do not vary.
     """
     across, up, values = result[x], result[y], result[value]
     columns, x_labels = _cells(across, x)
@@ -137,12 +142,14 @@ def _image(axes: Axes, medians: FloatArray, value: str) -> None:
         raise PlotError(f"no run of this sweep has a {value}")
     low, high = float(known.min()), float(known.max())
     norm = LogNorm(low, high) if low > 0.0 and high / low > WIDE else Normalize(low, high)
-    axes.set_facecolor("0.85")
+    axes.set_facecolor(UNKNOWN)
     axes.grid(visible=False)
     image = axes.imshow(medians, origin="lower", aspect="auto", cmap="viridis", norm=norm)
     figure = axes.get_figure(root=True)
     if figure is not None:
-        figure.colorbar(image, ax=axes, label=_label(value))
+        figure.colorbar(image, ax=axes, label=_label(value), ticks=[low] if low == high else None)
+    if known.size < medians.size:
+        legend_above(axes, [Patch(facecolor=UNKNOWN)], ["no value"], columns=1)
 
 
 def _label(name: str) -> str:
