@@ -1,11 +1,12 @@
 """Games in mathematics: brackets where they are needed, a player's number where formulas differ."""
 
+import re
 from pathlib import Path
 
 import pytest
 from latex2mathml.converter import convert
 
-from mixed_order_game import Game, read_model
+from mixed_order_game import Game, Recipe, new_game, read_model
 from mixed_order_game.reporting.expression_latex import latex_of
 from mixed_order_game.reporting.formulas import LOOP, costs, disturbances, dynamics
 
@@ -65,7 +66,7 @@ def test_every_player_of_every_game_has_a_cost_and_all_is_typeset(game: str) -> 
 def test_the_paper_s_example() -> None:
     model = read_model("five_vehicles")
     assert costs(model)[1].latex == (
-        r"f_2(x) = 2 \lVert x_{2} \rVert^2 + 2 x_{2,1} + 2 x_{2,2} + 2 + \lVert x_{2} - x_{3} \rVert^2"
+        r"f_{2}(x) = 2 \lVert x_{2} \rVert^2 + 2 x_{2,1} + 2 x_{2,2} + 2 + \lVert x_{2} - x_{3} \rVert^2"
     )
     lines = [(line.whose, line.latex) for line in dynamics(model)]
     assert lines[:4] == [
@@ -84,9 +85,18 @@ def test_players_whose_formulas_are_alike_share_a_line() -> None:
     game.player(4)["cost"] = {"quadratic": 1.0, "expression": "2 * x[i,1]^2"}
     lines = [(line.whose, line.latex) for line in costs(game.model())]
     assert lines == [
-        ("1 to 3, 5", r"f_i(x) = \lVert x_{i} \rVert^2 + \sum_{k=1}^{D} x_{i,k}^{4}"),
-        ("4", r"f_4(x) = \lVert x_{4} \rVert^2 + 2\,x_{4,1}^{2}"),
+        ("1 to 3, 5", r"f_{i}(x) = \lVert x_{i} \rVert^2 + \sum_{k=1}^{D} x_{i,k}^{4}"),
+        ("4", r"f_{4}(x) = \lVert x_{4} \rVert^2 + 2\,x_{4,1}^{2}"),
     ]
+
+
+def test_numbers_of_two_digits_are_one_index(tmp_path: Path) -> None:
+    game = tmp_path / "twelve.toml"
+    game.write_text(new_game(Recipe(players=12)), encoding="utf-8")
+    model = read_model(game)
+    assert costs(model)[11].latex.startswith("f_{12}(x) = ")
+    for line in [*costs(model), *dynamics(model), *disturbances(model)]:
+        assert not re.search(r"_\d\d", line.latex)
 
 
 def test_the_loop_is_typeset() -> None:

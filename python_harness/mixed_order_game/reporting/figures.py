@@ -146,10 +146,9 @@ def _plane(evidence: Evidence) -> Figure | None:
         dict.fromkeys((min(i, j) - 1, max(i, j) - 1) for i, j, _ in edges_of(result) if max(i, j) <= N)
     )
     data: list[Trace] = [
-        _line(x[:, i, 0], x[:, i, 1], _name(evidence, i), palette[i], width=1.5)
-        | {"showlegend": N <= MOST_LEGEND}
-        for i in range(N)
+        _line(x[:, i, 0], x[:, i, 1], _name(evidence, i), palette[i], width=1.5) for i in range(N)
     ]
+    together = len(np.unique(np.round(result.x_star[:N, :PLANE], 12), axis=0)) == 1
     data.append(
         {
             "type": "scatter",
@@ -157,7 +156,12 @@ def _plane(evidence: Evidence) -> Figure | None:
             "name": "equilibrium",
             "x": _packed(result.x_star[:N, 0]),
             "y": _packed(result.x_star[:N, 1]),
-            "marker": {"symbol": "x", "size": 9, "color": "black"},
+            "marker": {
+                "symbol": "x",
+                "size": 9,
+                "color": "black" if together else list(palette),
+                "line": {"color": "white", "width": 1},
+            },
         }
     )
     earlier = earlier_equilibria(result, N)[:, :PLANE]
@@ -188,7 +192,7 @@ def _plane(evidence: Evidence) -> Figure | None:
     ]
     stop: dict[str, Any] = {"mode": "immediate", "frame": {"duration": 0, "redraw": False}}
     layout = _layout("x_i1" + _unit(result, "x"), "x_i2" + _unit(result, "x")) | {
-        "height": 620,
+        "height": 650,
         "updatemenus": [
             {
                 "type": "buttons",
@@ -220,10 +224,10 @@ def _plane(evidence: Evidence) -> Figure | None:
         "sliders": [
             {
                 "active": 0,
-                "x": 0.2,
+                "x": 0.0,
                 "y": -0.12,
-                "len": 0.8,
-                "pad": {"t": 0},
+                "len": 1.0,
+                "pad": {"t": 24},  # pixels: below the buttons, also where the page is narrow
                 "currentvalue": {"prefix": "t = ", "suffix": " s", "xanchor": "right"},
                 "ticklen": 0,
                 "minorticklen": 0,
@@ -238,15 +242,16 @@ def _plane(evidence: Evidence) -> Figure | None:
             }
         ],
     }
-    layout["margin"]["b"] = 110
-    layout["legend"] = {"x": 1.0, "xanchor": "right", "y": 1.0, "bgcolor": "rgba(255,255,255,0.8)"}
+    layout["margin"]["b"] = 140
+    layout["showlegend"] = False  # the caption tells it
     layout["xaxis"]["constrain"] = layout["yaxis"]["constrain"] = "domain"
     layout["yaxis"]["scaleanchor"] = "x"
     first = " of the first two coordinates" if result.dimension > PLANE else ""
+    before = ", grey ones before the costs changed" if len(earlier) else ""
     caption = (
-        f"Paths in the plane{first}. Grey lines: the communication graph at the start; crosses: the "
-        f"equilibrium{', grey ones before the costs changed' if len(earlier) else ''}. "
-        f"Play moves the players, faster through slow parts.{_left_out(result)}"
+        f"Paths in the plane{first}. Colour: player{', numbered at its start' if N <= MOST_LEGEND else ''}; "
+        f"grey lines: the communication graph; crosses: the equilibrium{before}. Play moves the players, "
+        f"faster through slow parts.{_left_out(result)}"
     )
     return Figure("plane", "Paths in the plane", caption, data, layout, frames=frames)
 
@@ -340,7 +345,7 @@ def _consensus(evidence: Evidence) -> Figure:
         data.append(
             _positive(plain.time, plain["consensus_error"], "neither perturbed nor robust", PALETTE[1])
         )
-    layout = _over_time("|y - 1 (x) xbar|")
+    layout = _over_time("|y_ij - xbar_j|")
     layout["yaxis"] |= {"type": "log", "exponentformat": "power"}
     caption = "2-norm of all estimates' distances to the signals that the players share."
     caption += _shade(evidence, "consensus_error", result.players, data, layout)

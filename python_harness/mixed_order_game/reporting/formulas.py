@@ -49,7 +49,7 @@ def costs(model: Model) -> list[Formula]:
     def row(i: int, me: str) -> str:
         return _cost(_player(model, i).get("cost", {}), me, model.dimension)
 
-    return _written(model, lambda me: f"f_{me}(x)", row)
+    return _written(model, lambda me: f"f_{{{me}}}(x)", row)
 
 
 def dynamics(model: Model) -> list[Formula]:
