@@ -22,7 +22,7 @@ from .demo import demo
 from .explore import explore
 from .info import info
 from .new import new
-from .panels import grouped
+from .panels import Command, PlainFlags, grouped, help_of
 from .periods import periods
 from .plot import plot
 from .report import report
@@ -35,7 +35,7 @@ from .validate import validate
 from .verbosity import with_verbosity
 
 
-class ErrorsAsSentences(typer.core.TyperGroup):
+class ErrorsAsSentences(PlainFlags, typer.core.TyperGroup):
     """Prints the package's own exceptions as one sentence on stderr and exits with 1; Ctrl-C gives 130."""
 
     def invoke(self, ctx: Any) -> Any:
@@ -53,7 +53,6 @@ class ErrorsAsSentences(typer.core.TyperGroup):
 app = typer.Typer(
     name="mog",
     cls=ErrorsAsSentences,
-    help="Distributed Nash equilibrium seeking for mixed-order games, as an FMU.",
     no_args_is_help=True,
     rich_markup_mode="rich",
     pretty_exceptions_enable=False,
@@ -69,7 +68,6 @@ def _version(value: bool) -> None:
         raise typer.Exit
 
 
-@app.callback()
 def root(
     version: Annotated[
         bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version and exit.")
@@ -82,6 +80,8 @@ def root(
     """
 
 
+app.callback(help=help_of(root))(root)
+
 COMMANDS = {
     "Run and show": (demo, run, explore, plot, report),
     "Judge": (validate, analyse, compare),
@@ -91,7 +91,9 @@ COMMANDS = {
 }
 for heading, commands in COMMANDS.items():
     for command in commands:
-        app.command(rich_help_panel=heading)(with_verbosity(grouped(command)))
+        app.command(cls=Command, help=help_of(command), rich_help_panel=heading)(
+            with_verbosity(grouped(command))
+        )
 
 
 def main() -> None:

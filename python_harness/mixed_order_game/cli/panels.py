@@ -1,9 +1,10 @@
-"""Under which heading an option stands in help: the same one in every command."""
+"""How help looks: each option under the same heading in every command, paragraphs as wide as the terminal."""
 
 import inspect
 from collections.abc import Callable
-from typing import get_args
+from typing import Any, get_args
 
+import typer.core
 from typer.models import OptionInfo
 
 PANELS = {
@@ -41,3 +42,24 @@ def grouped(command: Callable[..., None]) -> Callable[..., None]:
             if isinstance(each, OptionInfo) and name in headings:
                 each.rich_help_panel = headings[name]
     return command
+
+
+def help_of(command: Callable[..., None]) -> str:
+    """The docstring with each paragraph in one line, as Typer keeps the line breaks of all but the first."""
+    return "\n\n".join(" ".join(part.split("\n")) for part in (inspect.getdoc(command) or "").split("\n\n"))
+
+
+class PlainFlags:
+    """Of commands and groups: options that take no value name no type in help."""
+
+    def get_params(self, ctx: Any) -> Any:
+        """The parameters, flags without the name of a type."""
+        params = super().get_params(ctx)  # type: ignore[misc]  # of Typer's class beside this one
+        for each in params:
+            if getattr(each, "is_flag", False) and each.metavar is None:
+                each.metavar = ""
+        return params
+
+
+class Command(PlainFlags, typer.core.TyperCommand):
+    """A command whose flags name no type in help."""

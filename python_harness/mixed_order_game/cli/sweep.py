@@ -64,7 +64,12 @@ def sweep(
     ] = None,
     samples: Annotated[int, typer.Option(min=0, help="Points drawn from the ranges.")] = 0,
     design: Annotated[
-        Sampling, typer.Option(case_sensitive=False, help="How points are drawn; Sobol wants a power of two.")
+        Sampling,
+        typer.Option(
+            case_sensitive=False,
+            metavar="METHOD",
+            help="How points are drawn: latin-hypercube, or sobol, which wants a power of two.",
+        ),
     ] = Sampling.LATIN_HYPERCUBE,
     graphs: Annotated[
         list[str] | None,
