@@ -198,7 +198,7 @@ function choose(name) {
 }
 choose(pictures.flat ? "lines" : "plane");
 $("plane").hidden = pictures.flat;
-$("lines-hint").textContent = pictures.flat ? "drag a start, or move it with the arrow keys" : ["solid", "dashed", "dotted", "dash-dotted"].slice(0, facts.dimension).map((dash, l) => `${l + 1} ${dash}`).join(", ");
+$("lines-hint").textContent = pictures.flat ? "drag a start, or use the arrow keys" : ["solid", "dashed", "dotted", "dash-dotted"].slice(0, facts.dimension).map((dash, l) => `${l + 1} ${dash}`).join(", ");
 const pairs = [[1, 2], [1, 3], [2, 3]].filter(([, b]) => b <= facts.dimension);
 $("axes").append(...pairs.map(pair => element("option", { value: pair, textContent: pair.join(" and ") })));
 $("axes-label").hidden = pairs.length < 2;

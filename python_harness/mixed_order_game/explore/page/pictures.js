@@ -71,10 +71,10 @@ export class Pictures {
     this.behind.push(this.curves(plot, this.plane.pinned, BEHIND));
     this.plane.graph = plot.multi_line({ field: "xs" }, { field: "ys" }, { source: this.plane.edges, line_alpha: 0.5, line_width: 1 });
     this.curves(plot, this.plane.paths);
-    this.plane.stars = plot.scatter({ field: "x" }, { field: "y" }, { source: this.plane.rest, marker: "x", size: 11, line_width: 2 });
     plot.scatter({ field: "x" }, { field: "y" }, {
       source: this.plane.players, size: 12, fill_color: { field: "colour" }, line_color: { field: "colour" }, line_width: 1.5,
     });
+    this.plane.stars = plot.scatter({ field: "x" }, { field: "y" }, { source: this.plane.rest, marker: "x", size: 11, line_width: 2 });
     await this.show("plane");
   }
 
