@@ -18,6 +18,7 @@ namespace mixed_order_game {
 /// What a leaf stands for; the index counts entries of a joint action, or named parameters.
 /// Held values belong to switches.
 enum class LeafKind : std::uint8_t { action, velocity, time, parameter, held };
+constexpr std::size_t leaf_kinds = 5;
 
 struct Leaf {
   LeafKind kind = LeafKind::action;

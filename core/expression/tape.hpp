@@ -2,6 +2,7 @@
 // lane, and what several results share is evaluated once.
 #pragma once
 
+#include <array>
 #include <memory>
 #include <utility>
 #include <vector>
@@ -48,6 +49,10 @@ class Tapes {
     LeafKind kind;
     std::vector<int> index;  ///< by lane of a player
   };
+  struct SumRow {
+    int row;
+    std::vector<int> index;  ///< of actions: term * lanes + lane
+  };
   struct ResultRow {
     int row;
     std::vector<int> place;  ///< by lane
@@ -58,6 +63,7 @@ class Tapes {
     int rows = 0;
     std::vector<TapeInstruction> code;
     std::vector<LeafRow> leaves;
+    std::vector<SumRow> sums;  ///< of actions, which are summed where they lie
     std::vector<ResultRow> results;
     std::vector<Real> start;  ///< all rows, with numbers where they stay
   };
@@ -68,13 +74,12 @@ class Tapes {
   struct Joined {
     struct Leaf {
       int row;
-      LeafKind kind;
       int index;
       int player;
     };
     std::vector<TapeInstruction> code;
-    std::vector<Leaf> leaves;
-    std::vector<std::pair<int, int>> results;  ///< row and place
+    std::array<std::vector<Leaf>, leaf_kinds> leaves;  ///< by kind
+    std::vector<std::pair<int, int>> results;          ///< row and place
     std::vector<Real> start;
   };
   static Joined joined(const std::vector<Tape>& tapes);

@@ -80,6 +80,9 @@ struct Kernels {
   /// Runs the code of a tape over rows of lanes, 1 or a multiple of 8; row k begins at rows + k * lanes. Lanes after
   /// those that are used repeat the first.
   void (*run_tape)(int count, const TapeInstruction* code, int lanes, int used, double* rows);
+  /// sum[lane] = points[lane][index[lane]] + points[lane][index[lanes + lane]] + ..., count terms in this order, lanes
+  /// a multiple of 8.
+  void (*sum_actions)(int count, int lanes, const double* const* points, const int* index, double* sum);
 
   // Newton solver
   /// L D L' of the blocks of one tile, in place; the diagonal is replaced by its inverse.

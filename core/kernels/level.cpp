@@ -50,6 +50,7 @@ const Kernels MIXED_ORDER_GAME_JOIN(kernels_, MIXED_ORDER_GAME_LEVEL) = {
     weight_rates,
     dot,
     run_tape,
+    sum_actions,
     factor_blocks,
     solve_blocks,
     factor_directed_blocks,

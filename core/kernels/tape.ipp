@@ -170,3 +170,17 @@ void run_tape(int count, const TapeInstruction* code, int lanes, int used, doubl
     run_lanes<false>(count, code, lanes, used, rows);
   }
 }
+
+void sum_actions(int count, int lanes, const double* const* points, const int* index, double* sum) {
+  constexpr int at_once = 8;  // sums that do not wait for each other
+  for (int first = 0; first < lanes; first += at_once) {
+    const double* const* from = points + first;
+    double total[at_once];
+    for (int k = 0; k < at_once; ++k) total[k] = from[k][index[first + k]];
+    for (int term = 1; term < count; ++term) {
+      const int* of = index + static_cast<Index>(term) * lanes + first;
+      for (int k = 0; k < at_once; ++k) total[k] += from[k][of[k]];
+    }
+    for (int k = 0; k < at_once; ++k) sum[first + k] = total[k];
+  }
+}

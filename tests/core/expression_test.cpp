@@ -258,6 +258,43 @@ TEST(Expressions, PlayersOfOneStructureShareATape) {
   }
 }
 
+TEST(Expressions, SumsOfActionsAreTakenTermByTermTheOwnOneFirst) {
+  constexpr int players = 37;  // a whole tape, and one with empty lanes
+  const NamedParameters named = parameters();
+  const Shape many{.players = players, .dimension = 1, .neurons = 1, .order = std::vector<int>(players, 1)};
+  std::vector<Real> points(at(players * players));  // each player sees others
+  RandomNumbers(4).fill(points, -1.0, 1.0);
+  const auto values_of = [&](const char* text) {
+    PlayerExpressions sums(players, players, players, 4);
+    for (int i = 0; i < players; ++i) {
+      const auto graph = std::make_shared<ExpressionGraph>(100'000);
+      const Place place{.shape = &many, .parameters = &named, .purpose = Purpose::cost, .player = i, .coordinate = -1};
+      sums.add(i, i, graph, unroll(parse_expression(text), place, *graph));
+    }
+    sums.compile();
+    std::vector<Real> values(players);
+    sums.values({.points = points.data(), .stride = players, .parameters = named.values.data()}, values.data());
+    return values;
+  };
+  const auto sum = [&](int i, int first, int last, int without) {
+    Real total = i >= first && i <= last && i != without ? points[at(i * players + i)] : 0.0;
+    for (int j = first; j <= last; ++j) {
+      if (j != i && j != without) total += points[at(i * players + j)];
+    }
+    return total;
+  };
+  const std::vector<Real> all = values_of("sum(x[j] for j in 1..N)");
+  const std::vector<Real> others = values_of("x[i] * sum(x[j] for j in 1..N if j != i)");
+  const std::vector<Real> some =
+      values_of("sum(x[j] for j in 1..7) * sum(x[j] for j in 1..N) - sum(x[j] for j in 5..9)");
+  for (int i = 0; i < players; ++i) {
+    const Real whole = sum(i, 0, players - 1, -1);
+    EXPECT_EQ(all[at(i)], whole);
+    EXPECT_EQ(others[at(i)], points[at(i * players + i)] * sum(i, 0, players - 1, i));
+    EXPECT_EQ(some[at(i)], sum(i, 0, 6, -1) * whole - sum(i, 4, 8, -1));
+  }
+}
+
 TEST(Expressions, PowersOfZeroAndTheErrorFunction) {
   const NamedParameters named = parameters();
   PlayerExpressions expressions(6, 3, 6, 4);

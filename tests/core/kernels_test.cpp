@@ -753,5 +753,28 @@ TEST(Vectors, ArePredictedByPascalsTriangle) {
   }
 }
 
+TEST(Kernels, SumsOfActionsAreTakenTermByTerm) {
+  RandomNumbers random(31);
+  for (const int lanes : {8, 32}) {
+    for (const int count : {1, 2, 17}) {
+      const Array actions(40 * lanes, random);
+      std::vector<const double*> points;
+      for (int lane = 0; lane < lanes; ++lane) points.push_back(static_cast<const double*>(actions) + 40 * lane);
+      std::vector<int> index;
+      for (int k = 0; k < count * lanes; ++k) index.push_back(static_cast<int>(random.below(40)));
+      const Array sums = on_every_level([&](const Kernels& kernel) {
+        Array sum(lanes);
+        kernel.sum_actions(count, lanes, points.data(), index.data(), sum);
+        return sum;
+      });
+      for (int lane = 0; lane < lanes; ++lane) {
+        double expected = 0.0;
+        for (int term = 0; term < count; ++term) expected += points[at(lane)][index[at(term * lanes + lane)]];
+        EXPECT_EQ(sums[lane], expected);
+      }
+    }
+  }
+}
+
 }  // namespace
 }  // namespace mixed_order_game
