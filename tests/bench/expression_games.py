@@ -14,9 +14,12 @@ from .scaling_game import scaling_game
 PAPER_GAME = Path(__file__).resolve().parents[2] / "modelDescription" / "games" / "five_vehicles.toml"
 
 DYNAMICS = ('"x[2,l]"', '["x[2,1]^2 + x[3,1]", "x[2,2]"]', '"3 * x[3,l]"', '"4 * x[4,l]"', '"5 * x[5,l]"')
+# The last terms of a text come first in its gradients, which so are summed as those of the coefficients are:
+# the same bits.
 FIVE_COST = (
-    "sum(i * (x[i,k]^2 + x[i,k]) for k in 1..D) + i"
-    " + sum(C[i,j] * sum((x[i,k] - x[j,k])^2 for k in 1..D) for j in 1..N)"
+    "i + sum(i * x[i,k] for k in 1..D)"
+    " + sum(C[i,N - h] * sum((x[i,k] - x[N - h,k])^2 for k in 1..D) for h in 0..N - 1)"
+    " + sum(i * x[i,k]^2 for k in 1..D)"
 )
 SCALING_COST = (
     "(1 + mod(i - 1, 5)) * (x[i,1]^2 + x[i,2]^2 + x[i,1] - x[i,2])"
@@ -24,8 +27,8 @@ SCALING_COST = (
 )
 
 
-def five_vehicles() -> str:
-    """The paper's example; its couplings are a fixed matrix."""
+def five_vehicles(cost: str = FIVE_COST) -> str:
+    """The paper's example; its couplings are a fixed matrix C."""
     text = PAPER_GAME.read_text(encoding="utf-8")
     coupling = [[0.0] * 5 for _ in range(5)]
     for i, j in ((1, 2), (2, 3), (3, 2), (4, 2), (4, 5), (5, 1)):
@@ -42,7 +45,7 @@ def five_vehicles() -> str:
     )
     tables = (
         f"[parameters]\nC = {{ value = {coupling}, fixed = true }}\n\n"
-        f'[defaults]\ncost = {{ expression = "{FIVE_COST}" }}\n'
+        f'[defaults]\ncost = {{ expression = "{cost}" }}\n'
         'disturbance = { expression = "i * sin(i * t)" }\n'
     )
     return text.replace("[[player]]", tables + "\n[[player]]", 1)
