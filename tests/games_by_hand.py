@@ -5,6 +5,7 @@ No expression is read. In costs x[..., i, j, l] is x_jl as player i sees it.
 
 from __future__ import annotations
 
+import re
 import tomllib
 from collections.abc import Callable
 from pathlib import Path
@@ -263,11 +264,11 @@ def switching_cooling() -> Functions:
     return Functions(costs, dynamics, disturbances, (*switches, 0.4, 0.8, 1.2))
 
 
-def two_hundred_households() -> Functions:
-    """Wishes and weights are numbers that were drawn: those of the file."""
+def two_hundred_households(players: int = 200) -> Functions:
+    """Wishes and weights are numbers that were drawn: those of the file, or its first ones."""
     given = tomllib.loads((GAMES / "two_hundred_households.toml").read_text(encoding="utf-8"))["parameters"]
-    h, w = np.array(given["h"]["value"]), np.array(given["w"]["value"])
-    i = np.arange(1, 201)[:, np.newaxis]
+    h, w = np.array(given["h"]["value"][:players]), np.array(given["w"]["value"][:players])
+    i = np.arange(1, players + 1)[:, np.newaxis]
 
     def costs(x: Numbers) -> Numbers:
         load = own(x)[..., 0]
@@ -281,6 +282,26 @@ def two_hundred_households() -> Functions:
         return np.asarray(2.0 * np.sin((0.5 + 0.01 * i) * t + i))
 
     return Functions(costs, dynamics, disturbances)
+
+
+def fewer_households(players: int) -> str:
+    """The game file with its first players alone, who also talk to the next one in the list."""
+    text = (GAMES / "two_hundred_households.toml").read_text(encoding="utf-8")
+    ring = [[i, i % players + 1] for i in range(1, players + 1)]
+
+    def first_ones(found: re.Match[str]) -> str:
+        name = found[1]
+        values = tomllib.loads(found[0])[name]
+        if name == "edges":
+            values = ring + [edge for edge in values if max(edge) <= players and edge not in ring]
+        elif name == "player":
+            line = '{{ name = "{name}", order = {order}, x0 = {x0} }}'
+            values = [line.format_map(player) for player in values[:players]]
+        else:
+            values = values[:players]
+        return f"{name} = [{', '.join(str(value) for value in values)}]"
+
+    return re.sub(r"^(player|edges|value) = \[\n.*?^\]$", first_ones, text, flags=re.MULTILINE | re.DOTALL)
 
 
 BY_HAND: dict[str, Callable[[], Functions]] = {
