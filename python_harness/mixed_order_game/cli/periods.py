@@ -38,6 +38,7 @@ def periods(
         list[str] | None,
         typer.Option(
             "--group",
+            metavar="PLAYERS",
             help="Players of one part, as in 1,2; one part a player without it.",
             show_default=False,
         ),

@@ -16,7 +16,10 @@ def ssp(
     group: Annotated[
         list[str] | None,
         typer.Option(
-            "--group", help="Players of one FMU, as in 1,2; one FMU a player without it.", show_default=False
+            "--group",
+            metavar="PLAYERS",
+            help="Players of one FMU, as in 1,2; one FMU a player without it.",
+            show_default=False,
         ),
     ] = None,
     force: ForceOption = False,

@@ -214,6 +214,8 @@ def periods(
             model.stop_time if stop_time is None else number_argument(stop_time, "stop_time", ExperimentError)
         )
         for each in wanted:
+            if not each > 0.0:
+                raise ExperimentError(f"period = {each:g} s is not positive")
             samples(0.0, stop, each)
             if each > LAST * stop:
                 raise ExperimentError(
