@@ -103,6 +103,13 @@ def tools() -> list[Tool]:
             "checked conformity and semantics",
             toolbox,
         ),
+        Tool("FMPy", version("fmpy"), "the same for a player apart and a plant outside", fmpy_validate_parts),
+        Tool(
+            "FMU Manipulation Toolbox",
+            pinned("fmu-manipulation-toolbox"),
+            "the same for a player apart and a plant outside",
+            toolbox_parts,
+        ),
         Tool("libcosim (libcosimpy)", version("libcosimpy"), simulation, libcosim),
         Tool("Ecos (ecospy)", pinned("ecospy"), simulation, ecos),
         Tool("FMI4j, Java", "0.38.0", simulation, fmi4j),
@@ -194,6 +201,25 @@ def toolbox(fmu: Path) -> str:
     if not all(sentence in output for sentence in expected) or "ERROR" in output or "WARNING" in output:
         raise FindingError(output)
     return "compliant, no semantic error"
+
+
+def fmpy_validate_parts(_: Path) -> str:
+    """`fmpy validate` of FMUs that wait for signals from outside."""
+    return "; ".join({fmpy_validate(fmu) for fmu in parts()})
+
+
+def toolbox_parts(_: Path) -> str:
+    """The toolbox's checks of the same."""
+    return "; ".join({toolbox(fmu) for fmu in parts()})
+
+
+def parts() -> list[Path]:
+    """FMUs of vehicle 3 alone, and of three players of whom one has its plant outside."""
+    alone, outside = TOOLS / "vehicle_3.fmu", TOOLS / "external_plant.fmu"
+    mog = ROOT / ".venv/bin/mog"
+    run([mog, "build", "five_vehicles", "--player", 3, "--output", alone])
+    run([mog, "build", ROOT / "tests/fuzz/games/external_plant.toml", "--output", outside])
+    return [alone, outside]
 
 
 def libcosim(fmu: Path) -> str:
