@@ -14,6 +14,7 @@ from typer.testing import CliRunner
 from mixed_order_game import default_fmu, read_model
 from mixed_order_game.cli.app import app
 from mixed_order_game.reporting.fmu_reference import fmu_reference, main
+from tests.vehicle.make import make_vehicle
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "python_harness" / "docs"
@@ -45,7 +46,7 @@ def run_page(page: str) -> None:
         elif language == "python":
             exec(compile(content, page, "exec"), namespace)  # noqa: S102 - our own documentation
         else:
-            assert language in ("text", "toml")
+            assert language in ("text", "toml", "c")
 
 
 def run_line(line: str) -> None:
@@ -70,6 +71,15 @@ def test_importers() -> None:
     run_page("importers.md")
 
 
+@pytest.mark.skipif(shutil.which("cc") is None, reason="the vehicle is compiled")
+def test_a_plant_of_one_s_own() -> None:
+    pytest.importorskip("libcosimpy.CosimExecution", reason="libcosimpy exists for x86_64 only")
+    make_vehicle(Path("vehicle.fmu"))
+    run_page("own_plant.md")
+    shown = next(content for language, content in blocks("own_plant.md") if language == "c")
+    assert shown in (ROOT / "tests/vehicle/vehicle.c").read_text(encoding="utf-8")
+
+
 def test_what_is_not_run_is_marked() -> None:
     sections = re.split(r"^## ", text_of("importers.md"), flags=re.MULTILINE)[1:]
     assert {section.splitlines()[0] for section in sections} == {
@@ -87,7 +97,9 @@ def test_what_is_not_run_is_marked() -> None:
         assert ("import casadi" in section) is ("*Run by `./dev compliance`*" in section)
 
 
-@pytest.mark.parametrize("page", ["games.md", "report.md", "importers.md", "theory_to_code.md"])
+@pytest.mark.parametrize(
+    "page", ["games.md", "report.md", "importers.md", "own_plant.md", "theory_to_code.md"]
+)
 def test_links_lead_somewhere(page: str) -> None:
     for target in re.findall(r"\]\(([^)#]+)\)", text_of(page)):
         assert target.startswith("https://") or (DOCS / target).exists(), target

@@ -86,7 +86,13 @@ def _particulars(model: Model, data: dict[str, Any]) -> Iterator[tuple[str, str 
     if model.elsewhere:
         yield "elsewhere", f"players {', '.join(map(str, model.elsewhere))}"
     for number, step in longest_sampled_step(model).items():
-        yield "external plant", f"of player {number}: communication steps below {step:.2g} s"
+        yield (
+            "external plant",
+            (
+                f"of player {number}: communication steps below {0.5 * step:.2g} s, "
+                f"{step:.2g} s if it steps after the FMU"
+            ),
+        )
     if found := data["equilibrium"]:
         yield "equilibrium", Text(" ".join(dict.fromkeys([found["sentence"], *found["warnings"]])))
 

@@ -112,7 +112,8 @@ def build_ssp(
 def longest_sampled_step(model: Model) -> dict[int, float]:
     """Bound of the communication step, s, for a stable loop through each external plant, by 1-based player.
 
-    2 / (k + K delta^2 / epsilon) with k = k1 (order 1) or k4 (order 2): a sampled loop with this gain.
+    2 / (k + K delta^2 / epsilon) with k = k1 (order 1) or k4 (order 2): a sampled loop with this gain, whose
+    plant steps after the law. Where both step at once, u is a step older, and the bound is half of this.
     """
     return {
         number: 2.0 / (gains["k"] + EXTERNAL_STEP * gains["delta"] ** 2 / gains["epsilon"])
@@ -126,7 +127,7 @@ def notes_of_parts(model: Model) -> list[str]:
     """What a user of an FMU with external plants has to know about its communication step."""
     return [
         f"player {number}: the loop through the external plant is stable only for communication steps below "
-        f"{step:.2g} s"
+        f"{0.5 * step:.2g} s where all FMUs step at once, {step:.2g} s where the plant steps after this one"
         for number, step in longest_sampled_step(model).items()
     ]
 

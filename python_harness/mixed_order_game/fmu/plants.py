@@ -75,9 +75,9 @@ class PlantFunctions:
     """The plants of n players with D coordinates each, and their states, in one run.
 
     A player's law is instantaneous in its own action (order 1) or velocity (order 2), here called p. If p and
-    u met at communication points alone, the loop would be stable only for steps below
-    2 / (k + K delta^2 / epsilon). So u follows p within each step: p' = f(t, x, v, u(p)) is solved by
-    backward differentiation formulas up to order 3, with variable steps. What else the FMU holds, estimates,
+    u met at communication points alone, the loop would be stable only for steps below 2 / (k + K delta^2 /
+    epsilon), or half of that. So u follows p within each step: p' = f(t, x, v, u(p)) is solved by backward
+    differentiation formulas up to order 3, with variable steps. What else the FMU holds, estimates,
     references and weights, first follows a predicted path of p; it is set back and follows the path that was
     found. The difference of both paths controls the step.
     """
