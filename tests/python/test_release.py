@@ -1,5 +1,8 @@
 """What keeps a release from being made before anything is built."""
 
+import re
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -35,3 +38,16 @@ def test_a_tag_that_the_files_know_is_a_release(
     tag(monkeypatch, "9.9.9")
     assert release.judged_version() == "9.9.9"
     assert not capsys.readouterr().err
+
+
+def test_a_package_index_gets_a_readme_whose_links_lead_somewhere() -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "hatch_fancy_pypi_readme"],
+        cwd=release.ROOT,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert done.stdout.startswith("# mixed-order-game\n")
+    assert "## Cite and licence" in done.stdout
+    assert [link for link in re.findall(r"\]\(([^)]*)\)", done.stdout) if not link.startswith("https:")] == []

@@ -282,58 +282,8 @@ class Simulator:
         The times of changes and of a Disturbance's rows become communication points when they lie between two
         samples; samples are taken at the same times as without them.
 
-        Parameters
-        ----------
-        start_values
-            Parameters and inputs to set first, by name; others keep the FMU's start values. A name without
-            indices stands for all of its kind, `a` for every `a[i,j]`, here, in `changes` and in `outputs`.
-        stop_time
-            End in s; default `start_time` plus the FMU's stop time.
-        start_time
-            Beginning in s; any, Unix time, say: disturbances are functions of it.
-        step
-            Time between samples in s; the last one is shorter if the horizon is not a multiple of it.
-        tolerance
-            Relative tolerance of the integrator, between 0 and 1.
-        outputs
-            Names to record; default all outputs and locals but y, W and the time derivatives. `x_star` is
-            always recorded.
-        inputs
-            External disturbance d_ext: a function of the time in s giving (N, D), or an array (N, D) or
-            (T, N, D) with one row a sample, each held over each communication step at the value of its
-            beginning; or a `schedule.Disturbance`, whose rows act exactly at their times, held or straight
-            between them.
-        feedback
-            Unknown dynamics g(t, x, v) besides the game's own, as a function, carried by d_ext: of the time
-            in s and all players' x and v (N, D), v NaN for order 1, giving (N, D); or functions of single
-            players by 1-based number, giving (D,). Asked as often as `tolerance` wants it, straight in
-            between; a jump is met within `step` / 500.
-        plant
-            Plants by 1-based player, as functions f(t, x, v, u) -> rate: t in s; x, v and u are the player's
-            own action, velocity and control, (D,) each, v NaN for order 1; the rate (D,) is that of x for
-            order 1, of v for order 2. It replaces the plant of the game: the player's dynamics and
-            disturbance are left out, x0 and v0 are where it starts, u_max is refused (bound u in the
-            function). It is integrated together with the FMU to `tolerance`, whatever `step` is; one whose
-            rate jumps to and fro with x, v or u, as -sign(v) does, ends in an error.
-        changes
-            Tunable parameters and inputs set on the way: time in s -> name -> value, each before the step
-            that begins at its time. A sample at the time of a change is taken before it.
-        progress
-            Called with the time reached, in s, after every step.
-        fine_start
-            Whether the first steps are sampled on a geometric grid besides, from a ten-thousandth of a step
-            on, for figures that show how the control begins.
-
-        Returns
-        -------
-        Result
-
-        Raises
-        ------
-        VariableError
-            For a variable that does not exist or does not take its value.
-        SimulationError
-            For whatever the FMU refuses, and for times, shapes and tolerances that make no sense.
+        Parameters, result and errors are those of `mixed_order_game.run`, but for the game, which this
+        Simulator has loaded.
         """
         if plant is not None and (numbers := self._replaced(plant)) != self.model.external:
             return self._with_plants_outside(numbers).run(

@@ -126,21 +126,7 @@ class Periods:
     def plot(self, axes: "Axes | None" = None, *, width: float = 3.5) -> "Axes":
         """Draw the final error over the period, on logarithmic axes.
 
-        Parameters
-        ----------
-        axes
-            Matplotlib axes to draw into; a figure of its own when left out.
-        width
-            Width of a figure of its own in inches.
-
-        Returns
-        -------
-        matplotlib.axes.Axes
-
-        Raises
-        ------
-        MissingPackageError
-            If Matplotlib is not installed.
+        Parameters, what is returned and the need of Matplotlib are as for `Result.plot`.
         """
         need("matplotlib")
         from ..results.period_figure import plot_periods
