@@ -24,7 +24,7 @@ def new(
             autocompletion=complete_graphs,
         ),
     ] = "ring",
-    seed: Annotated[int, typer.Option(help="Of everything random.")] = 0,
+    seed: Annotated[int, typer.Option(help="Seed of all that is random.")] = 0,
     title: Annotated[
         str | None, typer.Option(help="Title of the game.", show_default="from the rest")
     ] = None,

@@ -49,7 +49,7 @@ SettingsOption = Annotated[
 
 StopTimeOption = Annotated[float | None, typer.Option(help="End of every run in s.", show_default="FMU's")]
 
-StepOption = Annotated[float | None, typer.Option(help="Sampling in s.", show_default="FMU's")]
+StepOption = Annotated[float | None, typer.Option(help="Time between samples in s.", show_default="FMU's")]
 
 ToleranceOption = Annotated[
     float | None, typer.Option(help="Relative tolerance of the integrator.", show_default="FMU's")

@@ -52,7 +52,10 @@ def plot(
     ] = None,
     force: ForceOption = False,
 ) -> None:
-    """Draw the figures of a result; of a game the paper's four and those of a robust, perturbed run.
+    """Draw figures of a result, or of a game, which is run for them.
+
+    Of a game these are the paper's four, from a robust, perturbed run and from one that is neither, and the
+    other kinds from the first.
 
     [bold]Examples:[/bold]
 

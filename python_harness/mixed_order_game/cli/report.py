@@ -46,8 +46,7 @@ def report(
 
     mog report --set k3=10 --set "a\[1,3]=1" --output weak_consensus.html
 
-    mog run --output run.parquet
-    mog report run.parquet
+    mog report run.parquet --output run.html
     """
     from ..files.writing import PAGE
     from ..reporting.page import report as write_report

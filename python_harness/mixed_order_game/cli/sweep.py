@@ -85,7 +85,7 @@ def sweep(
         str | None,
         typer.Option(metavar="LOW:HIGH", help="Range of random v0; the game's own when left out."),
     ] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Of everything that is drawn.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of all that is random.")] = 0,
     stop_time: StopTimeOption = None,
     tolerance: ToleranceOption = None,
     settle_time: SettleTimeOption = None,
@@ -95,7 +95,8 @@ def sweep(
         typer.Option(min=0.0, help="Exit with 1 if a final error is not below.", show_default=False),
     ] = None,
     jobs: Annotated[
-        int | None, typer.Option("--jobs", "-j", min=1, help="Processes.", show_default="one a core")
+        int | None,
+        typer.Option("--jobs", "-j", min=1, help="Number of processes.", show_default="one a core"),
     ] = None,
     scheduler: Annotated[
         str | None,

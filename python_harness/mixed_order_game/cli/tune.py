@@ -57,7 +57,7 @@ def tune(
     stop_time: Annotated[
         float | None, typer.Option(help="End of the runs in s.", show_default="4 times the wish, at least 2")
     ] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Of the search and of random graphs.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the search and of random graphs.")] = 0,
     jobs: Annotated[
         int | None,
         typer.Option("--jobs", "-j", min=1, help="Processes for many graphs.", show_default="one a core"),
