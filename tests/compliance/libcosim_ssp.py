@@ -1,4 +1,4 @@
-"""Runs a system structure of single players with libcosim.
+"""Runs a system structure of players' FMUs with libcosim.
 
 `python libcosim_ssp.py SSP STOP STEP CSV ACTION...`
 Writes the actions, such as x[1,2], at the end.
@@ -20,6 +20,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         with zipfile.ZipFile(ssp) as archive:
             archive.extractall(folder)
+        models = {file.stem: read_model(file) for file in Path(folder, "resources").glob("*.fmu")}
         execution = CosimExecution.from_ssp_file(ssp_path=folder, step_size=round(float(step) * 1e9))  # ns
         observer = CosimObserver.create_last_value()
         execution.add_observer(observer)
@@ -27,9 +28,9 @@ def main() -> None:
             sys.exit(f"the steps to {stop} s failed")
         values = []
         for name in names:
-            player = f"player_{name[2:].partition(',')[0]}"
-            reference = read_model(Path(folder, "resources", f"{player}.fmu")).variable(name).reference
-            values += observer.last_real_values(execution.slave_index_from_instance_name(player), [reference])
+            part = next(part for part, model in models.items() if f"u{name[1:]}" in model.variables)
+            reference = models[part].variable(name).reference
+            values += observer.last_real_values(execution.slave_index_from_instance_name(part), [reference])
     lines = [";".join(["time", *names]), ";".join(repr(value) for value in (float(stop), *values))]
     Path(csv).write_text("\n".join(lines) + "\n", encoding="utf-8")
 

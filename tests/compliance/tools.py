@@ -23,9 +23,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mixed_order_game import read_model
+from mixed_order_game import run as simulate_game
 from mixed_order_game.fmu.coupled import Coupled
+from mixed_order_game.fmu.parts import build_ssp
 from mixed_order_game.fmu.run import samples
 from tests.games_by_hand import BY_HAND
+from tests.games_in_parts import GAMES
 from tests.oracle.general_loop import GeneralLoop
 
 from .cross_check import problems, write_cross_check
@@ -50,9 +53,13 @@ EXPRESSIONS = "cournot_isoelastic"
 COUPLED_STEPS = (0.01, 0.005, 0.0025)
 """Communication steps of coupled FMUs, s."""
 
+PART_STEPS = (0.02, 0.01, 0.005, 0.0025)
+"""Communication steps of games in parts, s."""
+
 PERIODS = (0.02, 0.05, 0.2)
 """Periods in s at which coupled FMUs are to do what they do in our master."""
-SAME = 1e-9
+SAME = 1e-4
+"""Of the largest difference: with a tolerance of 1e-6, times that are formed otherwise show."""
 
 FloatArray = NDArray[np.float64]
 Columns = Mapping[str, FloatArray]
@@ -130,6 +137,14 @@ def tools() -> list[Tool]:
             libcosim_ssp,
         ),
         Tool("Ecos (ecospy)", pinned("ecospy"), "coupled one FMU a player from SSP, 2 s", ecos_ssp),
+        Tool("FMPy", version("fmpy"), "coupled parts of three games from SSP, 1 s", fmpy_parts),
+        Tool(
+            "libcosim (libcosimpy)",
+            version("libcosimpy"),
+            "coupled parts of three games from SSP, 1 s",
+            libcosim_parts,
+        ),
+        Tool("Ecos (ecospy)", pinned("ecospy"), "coupled parts of three games from SSP, 1 s", ecos_parts),
         Tool("FMPy", version("fmpy"), "model exchange with CVode, 20 s", fmpy_exchange),
         Tool("fmi-sim, Rust", "0.7.0", "model exchange with explicit Euler, 5 s", fmi_sim_exchange),
         Tool(
@@ -262,6 +277,21 @@ def ecos_ssp(_: Path) -> str:
     return coupled([TOOLS / ".venv/bin/python", HERE / "ecos_ssp.py"])
 
 
+def fmpy_parts(_: Path) -> str:
+    """Three games in parts in FMPy."""
+    return games_in_parts([ROOT / ".venv/bin/python", HERE / "fmpy_ssp.py"])
+
+
+def libcosim_parts(_: Path) -> str:
+    """The same in libcosim."""
+    return games_in_parts([ROOT / ".venv/bin/python", HERE / "libcosim_ssp.py"])
+
+
+def ecos_parts(_: Path) -> str:
+    """The same in Ecos."""
+    return games_in_parts([TOOLS / ".venv/bin/python", HERE / "ecos_ssp.py"])
+
+
 def cross_check_folder(_: Path) -> str:
     """The folder as the cross-check's rules have it, judged by FMPy."""
     folder = TOOLS / "cross_check"
@@ -379,6 +409,37 @@ def coupled(command: Sequence[object]) -> str:
         f"within {', '.join(map(one_digit, differences))} of the oracle, steps of {steps} ms; "
         f"within {one_digit(max(apart))} of `mog periods`, periods of {periods} ms"
     )
+
+
+def games_in_parts(command: Sequence[object]) -> str:
+    """Run a driver on three games in parts; each difference from the whole has to fall with the step."""
+    rows = parts_against_whole(command)
+    for what, differences in rows.items():
+        if not all(fine < 0.65 * coarse for coarse, fine in pairwise(differences)):
+            raise FindingError(f"{what}: the difference does not fall with the step: {differences}")
+    steps = ", ".join(f"{1000.0 * step:g}" for step in PART_STEPS)
+    largest = [one_digit(max(differences)) for differences in zip(*rows.values(), strict=True)]
+    return f"within {', '.join(largest)} of the whole, steps of {steps} ms"
+
+
+def parts_against_whole(command: Sequence[object], stop: float = 1.0) -> dict[str, list[float]]:
+    """Largest difference of an action from the whole game's at the end, for each step, by game and split."""
+    folder = TOOLS / "parts"
+    folder.mkdir(exist_ok=True)
+    names = [f"x[{i},{k}]" for i in (1, 2, 3) for k in (1, 2)]
+    rows: dict[str, list[float]] = {}
+    for title in ("directed", "own gains", "expressions"):
+        game = folder / f"{title.replace(' ', '_')}.toml"
+        game.write_text(GAMES[title], encoding="utf-8")
+        whole = simulate_game(game, stop_time=stop, step=stop, tolerance=1e-9).x[-1].ravel()
+        for split, groups in (("apart", None), ("in groups", [[1, 2], [3]])):
+            ssp = build_ssp(game, folder / "game.ssp", groups=groups, force=True)
+            differences = rows[f"{title}, {split}"] = []
+            for step in PART_STEPS:
+                run([*command, ssp, stop, step, folder / "end.csv", *names])
+                found = columns(folder / "end.csv")
+                differences.append(float(np.abs([found[name][-1] for name in names] - whole).max()))
+    return rows
 
 
 def run(command: Sequence[object], folder: Path | None = None) -> str:
