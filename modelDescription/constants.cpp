@@ -1,41 +1,15 @@
 #include "constants.hpp"
 
 #include <cmath>
-#include <map>
 
-#include "definition/toml_reader.hpp"
 #include "equilibrium/box_constants.hpp"
 #include "errors.hpp"
 #include "json_text.hpp"
-#include "model.hpp"
-#include "settings.hpp"
+#include "requested_settings.hpp"
 
 namespace mixed_order_game {
 
 namespace {
-
-Parameters parameters_with(const TomlEntry& settings, const Model& model) {
-  Settings changed(model.game);
-  if (!settings.present()) return changed.parameters;
-  std::map<std::string, int, std::less<>> references;
-  for (int reference = 0; reference < model.variables.size(); ++reference) {
-    references.emplace(model.variables.name(reference), reference);
-  }
-  for (const std::string& name : settings.keys("a table of start values")) {
-    const TomlEntry entry = settings[name];
-    const auto found = references.find(name);
-    if (found == references.end() || !model.variables.family(found->second).write) {
-      entry.fail("a variable that can be set");
-    }
-    const Family& family = model.variables.family(found->second);
-    const Real value = entry.number();
-    if (!family.range.contains(value)) entry.fail(family.range.expectation());
-    family.write(changed, model.variables.variable(found->second).slot, value);
-  }
-  changed.parameters.refresh();
-  changed.parameters.judge_switching();
-  return changed.parameters;
-}
 
 std::vector<Interval> box_of(const TomlEntry& entry, const Shape& shape) {
   const std::string expected = "a list of " + std::to_string(shape.actions()) + " pairs of bounds";
@@ -84,7 +58,7 @@ std::string constants(std::string_view toml, std::string_view request) {
   asked.accept_keys({"box", "settings"});
   const Shape& shape = model.game.parameters.shape;
   if (!shape.hosts_all()) throw GameError("some players are elsewhere, expected a game with all of its players");
-  const Parameters parameters = parameters_with(asked["settings"], model);
+  const Parameters parameters = settings_with(asked["settings"], model).parameters;
   GameExpressions expressions;
   parse_game(toml, expressions);
   const BoxConstants found = box_constants(parameters, expressions, box_of(asked["box"], shape));

@@ -16,14 +16,15 @@
 #include "model_description.hpp"
 #include "reference_results.hpp"
 #include "resource_location.hpp"
+#include "sensitivity_run.hpp"
 
 using namespace mixed_order_game;
 
 namespace {
 
 constexpr const char* usage =
-    "usage: mixed-order-game-description [[--output FILE] [--extra FOLDER] | --check | --judge | --constants] "
-    "GAME.toml\n"
+    "usage: mixed-order-game-description [[--output FILE] [--extra FOLDER] | --check | --judge | --constants | "
+    "--sensitivities] GAME.toml\n"
     "\n"
     "Writes modelDescription.xml of a game to standard output.\n"
     "\n"
@@ -34,6 +35,10 @@ constexpr const char* usage =
     "  -k, --constants     write the constants of the theorems over a box, as JSON, to standard output; standard "
     "input\n"
     "                      has the request, in TOML: box = [[LOWER, UPPER], ...] and settings = { \"NAME\" = VALUE }\n"
+    "  -s, --sensitivities  write a run and how it changes with parameters, as JSON, to standard output; standard "
+    "input\n"
+    "                      has the request, in TOML: times = [T0, ...], parameters = [\"NAME\", ...], tolerance = R\n"
+    "                      and settings = { \"NAME\" = VALUE }\n"
     "  -h, --help          show this text\n"
     "\n"
     "Exit code: 0 fine, 1 the game is not valid or a file cannot be read or written, 2 wrong usage.\n";
@@ -80,19 +85,17 @@ Exit check(const std::string& toml) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  const option options[] = {{"output", required_argument, nullptr, 'o'},
-                            {"extra", required_argument, nullptr, 'e'},
-                            {"check", no_argument, nullptr, 'c'},
-                            {"judge", no_argument, nullptr, 'j'},
-                            {"constants", no_argument, nullptr, 'k'},
-                            {"help", no_argument, nullptr, 'h'},
-                            {}};
+  const option options[] = {{"output", required_argument, nullptr, 'o'}, {"extra", required_argument, nullptr, 'e'},
+                            {"check", no_argument, nullptr, 'c'},        {"judge", no_argument, nullptr, 'j'},
+                            {"constants", no_argument, nullptr, 'k'},    {"sensitivities", no_argument, nullptr, 's'},
+                            {"help", no_argument, nullptr, 'h'},         {}};
   std::string output;
   std::string extra;
   bool check_only = false;
   bool judge_only = false;
   bool constants_only = false;
-  for (int option = 0; (option = getopt_long(argc, argv, "o:e:cjkh", options, nullptr)) != -1;) {
+  bool sensitivities_only = false;
+  for (int option = 0; (option = getopt_long(argc, argv, "o:e:cjksh", options, nullptr)) != -1;) {
     switch (option) {
       case 'o':
         output = optarg;
@@ -109,6 +112,9 @@ int main(int argc, char** argv) {
       case 'k':
         constants_only = true;
         break;
+      case 's':
+        sensitivities_only = true;
+        break;
       case 'h':
         std::cout << usage;
         return fine;
@@ -117,7 +123,8 @@ int main(int argc, char** argv) {
         return wrong_usage;
     }
   }
-  const int ways = int{check_only} + int{judge_only} + int{constants_only} + int{!output.empty() || !extra.empty()};
+  const int ways = int{check_only} + int{judge_only} + int{constants_only} + int{sensitivities_only} +
+                   int{!output.empty() || !extra.empty()};
   if (optind + 1 != argc || ways > 1) {
     std::cerr << usage;
     return wrong_usage;
@@ -133,9 +140,12 @@ int main(int argc, char** argv) {
       return failure;
     }
     if (check_only) return check(toml);
-    if (judge_only || constants_only) {
+    if (judge_only || constants_only || sensitivities_only) {
       const auto request = [] { return std::string(std::istreambuf_iterator<char>(std::cin), {}); };
-      std::cout << (judge_only ? judgement(toml) : constants(toml, request())) << std::flush;
+      std::cout << (judge_only       ? judgement(toml)
+                    : constants_only ? constants(toml, request())
+                                     : sensitivity_run(toml, request()))
+                << std::flush;
       if (!std::cout) throw Error("cannot write to standard output");
       return fine;
     }

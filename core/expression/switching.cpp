@@ -279,7 +279,7 @@ Real Switching::rate(int k, const LeafValues& leaves, const LeafValues& rates) c
       const int index = rows.column[at(entry)];
       const Real rate = kind == LeafKind::action     ? rates.points[switches_[at(k)].row * rates.stride + index]
                         : kind == LeafKind::velocity ? rates.velocities[index]
-                                                     : 1.0;
+                                                     : rates.time;
       sum += entries[at(entry)] * rate;
     }
   }

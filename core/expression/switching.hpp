@@ -49,7 +49,7 @@ class Switching {
   /// Whether something depends on it.
   [[nodiscard]] bool is_active(int k, const LeafValues& leaves) const;
 
-  /// ds/dt of switch k along rates of what leaves stand for (parameters of 1 for time).
+  /// ds/dt of switch k along rates of actions, velocities and time (1 along a run).
   [[nodiscard]] Real rate(int k, const LeafValues& leaves, const LeafValues& rates) const;
 
   /// The absolute time of the next event of a timed switch after origin + t; infinite when there is none.

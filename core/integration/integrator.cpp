@@ -48,6 +48,7 @@ class Integrator::Implementation final : NewtonSystem, RosenbrockSystem {
 
   void start(Real t, Tolerances tolerances, const JudgingRule& rule);
   void set_equilibrium(std::span<const Real> x_star) { judge_.set_equilibrium(x_star); }
+  void set_follower(StepFollower* follower) { follower_ = follower; }
   void prepare_change();
   void restart(bool parameters_changed);
   void advance(Real t_end);
@@ -104,6 +105,8 @@ class Integrator::Implementation final : NewtonSystem, RosenbrockSystem {
   LocatedConditions conditions_;
   Judge judge_;
   Judge::Path path_;  // through CVODE's last step
+  StepFollower* follower_ = nullptr;
+  Modes modes_before_;
   int size_;
   std::int64_t most_steps_between_restarts_;
   Tolerances tolerances_;
@@ -417,6 +420,7 @@ void Integrator::Implementation::start(Real t, Tolerances tolerances, const Judg
   restart_state_ = state_;
   restart_modes_ = modes_;
   judge_.start(t, rule, {state_.data(), inputs_at(t)}, modes_);
+  if (follower_ != nullptr) follower_->begin(t);
   begin_at_restart_point();
 }
 
@@ -519,6 +523,11 @@ void Integrator::Implementation::take_step() {
          "the steps that the relative tolerance " + number_text(tolerances_.relative) +
              " asks for fell below the resolution of time");
   }
+  if (follower_ != nullptr) {
+    int order = 1;
+    CVodeGetLastOrder(cvode_.get(), &order);
+    follower_->step(internal_time_, order, N_VGetArrayPointer(vector_.get()), modes_);
+  }
   std::fill(passed_.begin(), passed_.end(), 0);
   if (flag == CV_ROOT_RETURN) {
     event_pending_ = true;
@@ -566,10 +575,17 @@ bool Integrator::Implementation::handle_event() {
   Real* state = N_VGetArrayPointer(vector_.get());
   interpolate(t, state);
   settle(t, state);
+  if (follower_ != nullptr) modes_before_ = modes_;
   const auto [events, restarts] =
       conditions_.pass(t, state, inputs_at(t), tolerances_.relative, passed_.data(), signals_, modes_);
   events_ += events;
-  if (!restarts && steps_since_restart_ < most_steps_between_restarts_) {
+  const bool goes_on = !restarts && steps_since_restart_ < most_steps_between_restarts_;
+  if (follower_ != nullptr) {
+    Real reached = t;
+    CVodeGetCurrentTime(cvode_.get(), &reached);
+    follower_->pass_event({t, state, modes_before_, modes_, !goes_on, reached == t});
+  }
+  if (goes_on) {
     if (has_planned_) plan_event(t);
     return false;
   }
@@ -718,6 +734,7 @@ void Integrator::start(Real t, Tolerances tolerances, const JudgingRule& rule) {
   implementation_->start(t, tolerances, rule);
 }
 void Integrator::set_equilibrium(std::span<const Real> x_star) { implementation_->set_equilibrium(x_star); }
+void Integrator::set_follower(StepFollower* follower) { implementation_->set_follower(follower); }
 void Integrator::prepare_change() { implementation_->prepare_change(); }
 void Integrator::restart(bool parameters_changed) { implementation_->restart(parameters_changed); }
 void Integrator::advance(Real t_end) { implementation_->advance(t_end); }

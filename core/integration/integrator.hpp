@@ -19,6 +19,7 @@
 #include <span>
 
 #include "integration/judge.hpp"
+#include "integration/step_follower.hpp"
 #include "loop/closed_loop.hpp"
 #include "loop/inputs.hpp"
 #include "newton/newton_solver.hpp"
@@ -67,6 +68,10 @@ class Integrator {
 
   /// Begins a run at time t with the loop's initial state.
   void start(Real t, Tolerances tolerances, const JudgingRule& rule = {});
+
+  /// What goes along with runs from the next start() on, in which nothing is changed and no checkpoint restored; it
+  /// must outlive the integrator. Null: nothing.
+  void set_follower(StepFollower* follower);
 
   /// x* for the judgement, at entry(i, l), from the next start() or restart() on; empty where it is not known.
   void set_equilibrium(std::span<const Real> x_star);

@@ -232,6 +232,49 @@ LocatedConditions::Change LocatedConditions::pass(Real t, const Real* state, con
   return change;
 }
 
+/// How fast the number whose sign a switch follows changes along rates of state and time.
+Real LocatedConditions::switch_rate(int family, int k, Real t, const Real* state, const Real* inputs,
+                                    const Modes& modes, const Real* state_rate, Real time_rate) const {
+  // each looks into the scratch of its own
+  LeafValues rates = leaves(family, t, state_rate, inputs_at_rest_.data(), modes);
+  if (family != cost) {
+    rate_x_.assign(rates.points, rates.points + loop_.shape().actions());
+    rate_v_.assign(rates.velocities, rates.velocities + loop_.shape().actions());
+    rates.points = rate_x_.data();
+    rates.velocities = rate_v_.data();
+  }
+  rates.time = time_rate;
+  return families()[at(family)].switching->rate(k, leaves(family, t, state, inputs, modes), rates);
+}
+
+Real LocatedConditions::event_time_along(Real t, const Real* state, const Real* inputs, const Modes& before,
+                                         const Modes& after, const Real* rate_before, const Real* along,
+                                         const std::vector<Real>& W_max_along) const {
+  const auto families = this->families();
+  for (int f = 0; f < static_cast<int>(families.size()); ++f) {
+    const auto& [switching, first, acts] = families[at(f)];
+    for (int k = 0; acts && k < switching->count(); ++k) {
+      if (before[at(first + k)] == after[at(first + k)] || switching->is_bend(k)) continue;
+      if (!switching->is_located(k)) return 0.0;
+      const Real speed = switch_rate(f, k, t, state, inputs, before, rate_before, 1.0);
+      return -switch_rate(f, k, t, state, inputs, before, along, 0.0) / speed;
+    }
+  }
+  for (int p = 0; p < columns_; ++p) {
+    if (before[at(p)] != 0.0 || after[at(p)] == 0.0) continue;
+    // w'w = W_max
+    Real change = -W_max_along[at(loop_.shape().player_of_own(p))];
+    Real speed = 0.0;
+    for (int m = 0; m < loop_.shape().neurons; ++m) {
+      const int w = loop_.layout().weights_of(m) + p;
+      change += 2.0 * state[w] * along[w];
+      speed += 2.0 * state[w] * rate_before[w];
+    }
+    return -change / speed;
+  }
+  return 0.0;
+}
+
 /// Where what a switch held before leads to its threshold and what it holds now leads back.
 void LocatedConditions::refuse_sliding(Real t, const Real* state, const Real* inputs, const Modes& before,
                                        const Modes& after) const {
@@ -248,16 +291,7 @@ void LocatedConditions::refuse_sliding(Real t, const Real* state, const Real* in
       if (!switching->is_active(k, leaves(f, t, state, inputs, after))) continue;
       const Real direction = held_after > held_before ? 1.0 : -1.0;
       const auto towards = [&](const Modes& modes, const AlignedVector& rate) {
-        // each looks into the scratch of its own
-        const Real* input_rates = inputs_at_rest_.data();
-        LeafValues rates = leaves(f, t, rate.data(), input_rates, modes);
-        if (f != cost) {
-          rate_x_.assign(rates.points, rates.points + loop_.shape().actions());
-          rate_v_.assign(rates.velocities, rates.velocities + loop_.shape().actions());
-          rates.points = rate_x_.data();
-          rates.velocities = rate_v_.data();
-        }
-        return direction * switching->rate(k, leaves(f, t, state, inputs, modes), rates);
+        return direction * switch_rate(f, k, t, state, inputs, modes, rate.data(), 1.0);
       };
       if (!(towards(before, rate_before_) > 0.0 && towards(after, rate_after_) < 0.0)) continue;
       throw Error(switching->description(k) + " slides at t = " + number_text(loop_.time_origin() + t, 15) +

@@ -48,6 +48,13 @@ class LocatedConditions {
   Change pass(Real t, const Real* state, const Real* inputs, Real tolerance, const int* passed, Signals& signals,
               Modes& modes) const;
 
+  /// How the time of an event that changed modes moves, where the state just before it moves along a direction, and
+  /// with it the bounds W_max of the weights, by player: dt*/dp from the condition that ended there. 0 where time alone
+  /// ended it, or none did. The rates are those just before.
+  [[nodiscard]] Real event_time_along(Real t, const Real* state, const Real* inputs, const Modes& before,
+                                      const Modes& after, const Real* rate_before, const Real* along,
+                                      const std::vector<Real>& W_max_along) const;
+
   /// The switch of an expression that changed last, for messages; empty when there was none.
   [[nodiscard]] const std::string& last_switch() const { return last_switch_; }
 
@@ -65,6 +72,8 @@ class LocatedConditions {
   /// Where a control is that is bounded: -1, 0 or 1.
   [[nodiscard]] Real place_of_control(int p, const Signals& signals) const;
   void pass_switches(Real t, const Real* state, const Real* inputs, const int* passed, Modes& modes) const;
+  [[nodiscard]] Real switch_rate(int family, int k, Real t, const Real* state, const Real* inputs, const Modes& modes,
+                                 const Real* state_rate, Real time_rate) const;
   void refuse_sliding(Real t, const Real* state, const Real* inputs, const Modes& before, const Modes& after) const;
 
   const ClosedLoop& loop_;

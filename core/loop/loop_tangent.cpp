@@ -37,6 +37,11 @@ void LoopTangent::follow(Real t, const Real* at_state, const Real* at_inputs, co
   evaluate(nullptr, t, at_state, at_inputs, modes);
 }
 
+void LoopTangent::follow(const Parameters& direction, Real t, const Real* at_state, const Real* at_inputs,
+                         const Modes& modes) {
+  evaluate(&direction, t, at_state, at_inputs, modes);
+}
+
 void LoopTangent::follow_parameters(const Parameters& direction, Real t, const Real* at_state, const Real* at_inputs,
                                     const Modes& modes) {
   loop_->initial_state(direction.initial, state.data());

@@ -29,7 +29,10 @@ class LoopTangent {
   /// Sets control, rate and actions at time t [s], a state and inputs.
   void follow(Real t, const Real* at_state, const Real* at_inputs, const Modes& modes);
 
-  /// The same at the start of a run along parameters, too; sets state to the change of the initial state.
+  /// The same along parameters, too.
+  void follow(const Parameters& direction, Real t, const Real* at_state, const Real* at_inputs, const Modes& modes);
+
+  /// The same at the start of a run; sets state to the change of the initial state.
   void follow_parameters(const Parameters& direction, Real t, const Real* at_state, const Real* at_inputs,
                          const Modes& modes);
 

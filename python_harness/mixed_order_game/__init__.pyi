@@ -29,6 +29,8 @@ from .studies.compare import compare as compare
 from .studies.periods import Period as Period
 from .studies.periods import Periods as Periods
 from .studies.periods import periods as periods
+from .studies.sensitivities import Sensitivities as Sensitivities
+from .studies.sensitivities import sensitivities as sensitivities
 from .studies.sweep.conduct import sweep as sweep
 from .studies.sweep.definition import Sweep as Sweep
 from .studies.tune import tune as tune
