@@ -1,12 +1,18 @@
 """u_max: the control that reaches the plant lies within its bound, against the oracle extended by it."""
 
+import tomllib
 from pathlib import Path
 
 import numpy as np
 import pytest
+from latex2mathml.converter import convert
 
 import mixed_order_game as mog
 from mixed_order_game import GameError, Simulator, build_fmu, check_game
+from mixed_order_game.game.parameters import game_parameters
+from mixed_order_game.reporting.formulas import BOUNDED, LOOP, loop
+from mixed_order_game.studies.claims.control_bounds import control_bounds
+from mixed_order_game.studies.designs import Range
 from tests.oracle.game import read_game
 from tests.oracle.simulate import simulate
 
@@ -112,5 +118,26 @@ def test_what_is_no_bound(tmp_path: Path, line: str, instead: str, told: str) ->
 def test_validation_tells_what_the_bounds_do(bounded: Path) -> None:
     notes = "\n".join(mog.validate(bounded, limit=30.0).notes)
     assert "The theorems know no such bound" in notes
-    assert "In the default experiment controls of player 2, 3 are at their bounds" in notes
+    assert "controls are at their bounds, of player " in notes
+    assert "of player 2 until " in notes
+    assert "of player 3 until " in notes
+    assert "of player 1" not in notes
     assert "control of player 3 may have to reach 6" not in notes  # 1 + 5 = 6 is within 7
+
+
+def test_each_player_beyond_its_bound_is_told_of_once() -> None:
+    game = mog.Game(tomllib.loads(GAME))
+    game.player(3)["u_max"] = [2.0, 3.0]
+    told = control_bounds(None, game_parameters(game.model()))
+    assert [note for note in told if "player 3" in note] == [
+        "To stay at x* the control of player 3 may have to reach 6, beyond its bound 2; then the loop "
+        "linearized at x* without bounds is not the one that acts."
+    ]
+
+
+def test_reports_and_tuning_tell_of_bounds(bounded: Path) -> None:
+    assert loop(mog.read_model(bounded))[-1][0] == "bounded control, players 2 to 3"
+    assert "merror" not in convert(BOUNDED)
+    assert len(loop(mog.read_model())) == len(loop(None)) == len(LOOP)
+    weak = mog.tune(bounded, 1.0, gains=["k2"], ranges={"k2": Range(0.9, 1.1)}, band=2.0)
+    assert "the least u_max is 7: where one is at its bound" in " ".join(weak.notes)

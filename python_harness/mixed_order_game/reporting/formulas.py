@@ -35,12 +35,24 @@ LOOP = (
 """What every game has in common: the loop of the paper, line by line."""
 
 
+BOUNDED = r"u_{il}\ \text{within}\ [-u_{\max,il},\ u_{\max,il}]"
+
+
 @dataclass(frozen=True)
 class Formula:
     """One line: of whom, and LaTeX."""
 
     whose: str
     latex: str
+
+
+def loop(model: Model | None) -> list[tuple[str, str]]:
+    """The lines of the loop, and whose controls are bounded."""
+    players = [] if model is None else range(model.players)
+    bounded = [i for i in players if model is not None and "u_max" in _player(model, i)]
+    if model is None or not bounded:
+        return list(LOOP)
+    return [*LOOP, (f"bounded control, {_whose(bounded, model.players)}", BOUNDED)]
 
 
 def costs(model: Model) -> list[Formula]:
@@ -85,6 +97,11 @@ def _written(model: Model, left: Callable[[str], str], row: Callable[[int, str],
         else:
             lines.append(Formula(_named(players, model.players), f"{left('i')} = {general}"))
     return lines
+
+
+def _whose(players: Sequence[int], count: int) -> str:
+    named = _named(players, count)
+    return named if len(players) == count else f"player{'s' * (len(players) > 1)} {named}"
 
 
 def _named(players: Sequence[int], count: int) -> str:

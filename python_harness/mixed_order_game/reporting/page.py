@@ -29,7 +29,7 @@ from ..version import package_version
 from .evidence import Evidence, energy_so_far, evidence_of_game, evidence_of_result, thinned
 from .expression_latex import name_in_latex
 from .figures import Figure, figures
-from .formulas import LOOP, costs, disturbances, dynamics
+from .formulas import costs, disturbances, dynamics, loop
 
 TEMPLATE = "page.html.j2"
 SAMPLES = (2000, 1000, 500, 250, 125)
@@ -148,7 +148,7 @@ def render_page(evidence: Evidence) -> str:
         figures=drawn,
         figure_data=data,
         formulas=[] if evidence.model is None else _formulas(evidence.model),
-        loop=[(name, _typeset(latex)) for name, latex in LOOP],
+        loop=[(name, _typeset(latex)) for name, latex in loop(evidence.model)],
         named_parameters=[] if evidence.model is None else _named_parameters(evidence.model),
         analysis=evidence.analysis,
         analysis_rows=[] if evidence.analysis is None else _analysis_rows(evidence.analysis),

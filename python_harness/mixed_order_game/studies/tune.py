@@ -74,6 +74,9 @@ AT_LIMIT = 0.01
 WORSE = 1.1
 """Factor from which on a larger final error is told."""
 
+ROUNDING = 1e-12
+"""Of a control at its bound."""
+
 CHEAPER, FARTHER = -0.15, 0.3
 """First steps of the simplex in the gains' logarithms: smaller gains save energy, larger ones reject more."""
 
@@ -100,6 +103,7 @@ class Tuned:
     slowest_rate: float  # 1/s, smallest over the graphs: minus the spectral abscissa of the linear loop
     simulations: int = field(default=0)
     interrupted: bool = False  # by Ctrl-C: the gains are the best so far
+    least_bound: float = float("inf")  # of the controls, u_max; infinite where there is none
 
     @property
     def met(self) -> bool:
@@ -138,7 +142,7 @@ class Tuned:
 
     @property
     def notes(self) -> list[str]:
-        """What the gains cost, in sentences: gains at the ends of their ranges, a larger final error."""
+        """What is to be known of the gains, in sentences: ends of their ranges, a larger error, bounds."""
         notes = [
             f"{name} = {self.gains[name]:g} lies at an end of its range, {each.low:g} to {each.high:g}:"
             " a wider one may do better"
@@ -149,6 +153,12 @@ class Tuned:
         if after > WORSE * before:
             told = f"the final error {after:.4g} is {after / before:.3g} times that before, {before:.4g}"
             notes.append(told + ("" if self.largest_error else "; a largest error can be wished"))
+        peak = max((found.control_peak for found in self.metrics if found is not None), default=0.0)
+        if peak >= self.least_bound * (1.0 - ROUNDING):
+            notes.append(
+                f"controls come up to {peak:.4g}, the least u_max is {self.least_bound:g}: where one is at "
+                "its bound, the run tells of these initial values alone"
+            )
         return notes
 
     @property
@@ -409,6 +419,7 @@ class _Search:
             slowest_rate=min(-spectral_abscissa(linear_loop(self.parameters(gains, a))) for a in self.loops),
             simulations=self.simulations,
             interrupted=interrupted,
+            least_bound=float(self.game.u_max.min()),
         )
 
     def _sought(self, seed: int, progress: Progress) -> tuple[dict[str, float], list[Metrics | None]]:

@@ -1,6 +1,7 @@
 """What bounds u_max of the controls do to the claims: the theorems know none."""
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...game.definition import has_expressions
 from ...game.parameters import FloatArray, GameParameters
@@ -8,10 +9,13 @@ from ...results.result import Result
 from ...results.unknown_term import UNKNOWN
 from ...theory.spectrum import nash_equilibrium
 
+MOST_TOLD = 8
+"""Players of whom is told."""
 
-def at_bound(u: FloatArray, game: GameParameters) -> np.ndarray:
+
+def at_bound(u: FloatArray, game: GameParameters) -> NDArray[np.bool_]:
     """Where controls u (T, N, D) are at their bounds, up to the rounding of a result file."""
-    return np.abs(u) >= game.u_max * (1.0 - 1e-12)
+    return np.asarray(np.abs(u) >= game.u_max * (1.0 - 1e-12))
 
 
 def control_bounds(run: Result | None, game: GameParameters) -> list[str]:
@@ -24,16 +28,17 @@ def control_bounds(run: Result | None, game: GameParameters) -> list[str]:
     )
     notes = [told]
     if run is not None:
-        held = at_bound(run.u, game)
-        if held.any():
-            players = [str(i + 1) for i in np.flatnonzero(held.any(axis=(0, 2)))]
-            moments = held.any(axis=(1, 2))
-            notes.append(
-                f"In the default experiment controls of player {', '.join(players)} are at their bounds at "
-                f"{moments.mean():.0%} of the samples, the last at {run.time[moments][-1]:.4g} s."
-            )
-        else:
-            notes.append("In the default experiment no sampled control is at its bound.")
+        held = np.any(at_bound(run.u, game), axis=2)  # (T, N)
+        until = {i: float(run.time[held[:, i]][-1]) for i in np.flatnonzero(held.any(axis=0))}
+        longest = sorted(until, key=lambda i: -until[i])
+        told_of = [f"of player {i + 1} until {until[i]:.4g} s" for i in longest[:MOST_TOLD]]
+        if len(longest) > MOST_TOLD:
+            told_of.append(f"of {len(longest) - MOST_TOLD} more players before")
+        notes.append(
+            f"In the default experiment controls are at their bounds, {', '.join(told_of)}."
+            if told_of
+            else "In the default experiment no sampled control is at its bound."
+        )
     return notes + _beyond_at_equilibrium(game)
 
 
@@ -45,8 +50,10 @@ def _beyond_at_equilibrium(game: GameParameters) -> list[str]:
     g = np.einsum("ijl,jl->il", game.dynamics_linear, x_star)
     g = g + np.einsum("ijl,jl->il", game.dynamics_square, x_star**2)
     needed = np.abs(g) + game.disturbance_bound
+    farthest = np.argmax(needed - game.u_max, axis=1)
+    beyond = [(i, k) for i, k in enumerate(farthest) if needed[i, k] > game.u_max[i, k]]
     return [
         f"To stay at x* the control of player {i + 1} may have to reach {needed[i, k]:.4g}, beyond its bound "
         f"{game.u_max[i, k]:.4g}; then the loop linearized at x* without bounds is not the one that acts."
-        for i, k in np.argwhere(needed > game.u_max)
-    ]
+        for i, k in beyond[:MOST_TOLD]
+    ] + ([f"So it is for {len(beyond) - MOST_TOLD} more players."] if len(beyond) > MOST_TOLD else [])
