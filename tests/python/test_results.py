@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
@@ -87,6 +87,7 @@ def test_round_trip_is_exact(suffix: str, tmp_path: Path) -> None:
     assert [path.name for path in (tmp_path / "folder").iterdir()] == [f"run{suffix}"]
 
 
+@settings(deadline=None)  # of files on shared cores
 @given(arrays(np.float64, st.integers(1, 20), elements=st.floats(width=64)))
 def test_files_keep_every_digit(values: np.ndarray) -> None:
     result = Result(time=np.arange(float(len(values))), columns={"x[1,1]": values, 'odd "name",': -values})
@@ -97,6 +98,7 @@ def test_files_keep_every_digit(values: np.ndarray) -> None:
                 np.testing.assert_array_equal(again[name], column)
 
 
+@settings(deadline=None)
 @given(st.lists(st.tuples(st.sampled_from("xvW"), st.lists(st.integers(1, 99), max_size=3))))
 def test_split_and_parse_invert_joining(parts: list[tuple[str, list[int]]]) -> None:
     names = [stem + (f"[{','.join(map(str, index))}]" if index else "") for stem, index in parts]
