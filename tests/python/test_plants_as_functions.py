@@ -2,6 +2,7 @@
 
 # ruff: noqa: ARG001, ARG005 - not every plant depends on all that it is given
 
+import json
 import math
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -10,8 +11,10 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from typer.testing import CliRunner
 
 import mixed_order_game as mog
+from mixed_order_game.cli.app import app
 from mixed_order_game.errors import ExperimentError, GameError, ModelError, SimulationError, VariableError
 
 Floats = NDArray[np.float64]
@@ -186,3 +189,31 @@ def test_a_bounded_control_is_refused_and_a_run_after_an_error_is_as_new(simulat
     again, once = (simulator.run(plant={4: vehicle(4)}, stop_time=0.1) for _ in range(2))
     for name, column in once.columns.items():
         np.testing.assert_array_equal(again[name], column, err_msg=name)
+
+
+def test_the_command_takes_functions_from_files(tmp_path: Path) -> None:
+    (tmp_path / "drag.py").write_text("def drag(v): return -0.5 * v\n")
+    (tmp_path / "models.py").write_text(
+        "import drag\n"
+        "def vehicle(t, x, v, u): return u + drag.drag(v)\n"
+        "def wind(t, x, v): return 0.3 * x\n"
+        "mass = 2.0\n"
+    )
+    (tmp_path / "broken.py").write_text("import nothing_of_the_kind\n")
+
+    def said(*options: str) -> str:
+        arguments = ["run", "five_vehicles", "--stop-time", "0.2", "--json", *options]
+        done = CliRunner(env={"COLUMNS": "200", "NO_COLOR": "1"}).invoke(app, arguments)
+        return done.output if done.exit_code else str(json.loads(done.output)["metrics"]["final_error"])
+
+    models = tmp_path / "models.py"
+    direct = mog.run("five_vehicles", plant={4: lambda t, x, v, u: u - 0.5 * v}, stop_time=0.2)
+    assert said("--plant", f"4={models}:vehicle") == str(direct.metrics.final_error)
+    assert said("--plant", f"4={models}:vehicle", "--feedback", f"{models}:wind") != said(
+        "--plant", f"4={models}:vehicle"
+    )
+    assert "models.py has no function mass: it has vehicle, wind" in said("--feedback", f"{models}:mass")
+    assert "broken.py cannot be run: ModuleNotFoundError" in said("--feedback", f"{tmp_path}/broken.py:f")
+    assert "there is no Python file" in said("--feedback", f"{tmp_path}/none.py:f")
+    assert "'f' is no function of a file" in said("--feedback", "f")
+    assert "'vehicle.py:f' is no player with its function" in said("--plant", "vehicle.py:f")

@@ -9,9 +9,9 @@ from typer.models import OptionInfo
 
 PANELS = {
     "The game": (
-        "baselines", "dimension", "disturbance", "example", "fmu", "graph", "graph_schedule",
-        "group", "linear_disturbance", "orders", "player", "players", "settings", "square", "title",
-        "variants",
+        "baselines", "dimension", "disturbance", "example", "feedback", "fmu", "graph", "graph_schedule",
+        "group", "linear_disturbance", "orders", "plant", "player", "players", "settings", "square",
+        "title", "variants",
     ),
     "What is varied": (
         "design", "gains", "graphs", "grid", "initial_actions", "initial_states",

@@ -56,6 +56,20 @@ def run(
     linear_disturbance: Annotated[
         bool, typer.Option("--linear-disturbance", help="Straight between its rows, not held.")
     ] = False,
+    plant: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="PLAYER=FILE:FUNCTION",
+            help="A Python function f(t, x, v, u) -> rate in place of a player's plant; repeatable.",
+        ),
+    ] = None,
+    feedback: Annotated[
+        str | None,
+        typer.Option(
+            metavar="FILE:FUNCTION",
+            help="A Python function g(t, x, v) of all players, added to the unknown dynamics.",
+        ),
+    ] = None,
     force: ForceOption = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -68,7 +82,10 @@ def run(
     mog run my_game.toml --stop-time 5 --variables x,v,nash_error --output result.csv
 
     mog run --graph-schedule switching.toml --disturbance gust.csv
+
+    mog run --plant 4=vehicle.py:plant
     """
+    from ..files.functions import function_of_text
     from ..files.writing import RESULT
     from ..fmu.run import Simulator
     from ..fmu.schedule import read_disturbance, read_graph_schedule
@@ -76,6 +93,8 @@ def run(
 
     values = settings_of(settings or [])
     names = names_option(variables, "--variables") if variables else None
+    plants = {number: function_of_text(text) for number, text in map(_player_and_function, plant or [])}
+    dynamics = None if feedback is None else function_of_text(feedback)
     if output is not None:
         output_option(output, RESULT, inputs=[game, graph_schedule, disturbance], force=force)
     with Simulator(game) as simulator, progress_by_name() as show:
@@ -96,6 +115,8 @@ def run(
             inputs=None
             if disturbance is None
             else read_disturbance(disturbance, model, linear=linear_disturbance),
+            plant=plants or None,
+            feedback=dynamics,
             progress=lambda time: show("simulating", (time - start_time) / span),
         )
     if output is not None:
@@ -104,3 +125,13 @@ def run(
         typer.echo(json.dumps(result_data(result), indent=2))
     elif output is None:
         print_result(result)
+
+
+def _player_and_function(text: str) -> tuple[int, str]:
+    """The parts of 4=vehicle.py:plant. Raises typer.BadParameter."""
+    number, equals, function = text.partition("=")
+    if not equals or not number.strip().isdecimal():
+        raise typer.BadParameter(
+            f"{text!r} is no player with its function, such as 4=vehicle.py:plant", param_hint="--plant"
+        )
+    return int(number), function
