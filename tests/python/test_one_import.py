@@ -18,7 +18,7 @@ from mixed_order_game.studies.sampler import Settings
 
 GAME = "energy_consumption"
 FUNCTIONS = [name for name in dir(mog) if inspect.isfunction(getattr(mog, name))]
-METHODS: list[Any] = [mog.Simulator.run, mog.Result.plot, mog.Game, mog.Validation.plot]
+METHODS: list[Any] = [mog.Result.plot, mog.Game, mog.Validation.plot]
 DOCUMENTED = [getattr(mog, name) for name in FUNCTIONS if name != "package_version"] + METHODS
 
 
@@ -91,6 +91,12 @@ def test_results_show_themselves_in_a_notebook() -> None:
     hostile = mog.Game({"title": "<script>", "player": []})
     assert "<script>" not in hostile._repr_html_()
     assert verdict.plot().get_yscale() == "log"
+
+
+def test_what_is_said_of_run_holds_for_a_simulator() -> None:
+    own, told = (inspect.signature(each).parameters for each in (mog.Simulator.run, mog.run))
+    described = {name: (each.kind, each.default) for name, each in told.items() if name != "game"}
+    assert {name: (each.kind, each.default) for name, each in own.items() if name != "self"} == described
 
 
 @pytest.mark.parametrize("documented", DOCUMENTED, ids=lambda each: str(each.__qualname__))

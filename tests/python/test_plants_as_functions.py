@@ -159,7 +159,7 @@ def broken(t: float, *_: Floats) -> Floats:
         ({"plant": {4: broken}}, SimulationError, r"player 4 at 0\.2\d* s: ZeroDivisionError: no road left"),
         ({"plant": {4: lambda t, x, v, u: x[0]}}, ExperimentError, r"at 0 s has the shape \(\), not \(2,\)"),
         ({"plant": {3: lambda t, x, v, u: v}}, ExperimentError, "rate \\[nan, nan\\], expected finite"),
-        ({"plant": {4: lambda t, x, v, u: u - 9 * np.sign(v)}}, SimulationError, r"tanh\(s / width\)"),
+        ({"plant": {4: lambda t, x, v, u: u - 30 * np.sign(v)}}, SimulationError, r"tanh\(s / width\)"),
         ({"plant": {4: broken}, "changes": {0.1: {"x[4,1]": 1.0}}}, ExperimentError, "set twice: by plant"),
         ({"plant": {4: broken}, "start_values": {"d_ext[4,1]": 1.0}}, VariableError, "no variable d_ext"),
         ({"plant": {4: broken}, "inputs": np.ones((5, 2))}, ExperimentError, "player 4, whose plant is"),

@@ -122,8 +122,10 @@ def groups_of(players: int, groups: Sequence[Collection[int]] | None) -> tuple[t
 class _Part(Simulator):
     """The FMU of some players, stepped by hand."""
 
+    _holds_all_players = False
+
     def __init__(self, fmu: GameSource) -> None:
-        super().__init__(fmu, part=True)
+        super().__init__(fmu)
         variables = self.model.variables.values()
         self.inputs = [
             each.name

@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 from fmpy.fmi2 import fmi2True
 from numpy.typing import ArrayLike, NDArray
-from scipy.optimize import root
 
 from ..errors import ExperimentError, GameError, SimulationError
 from ..game.definition import Table, initial_estimates, initial_references
@@ -151,7 +150,8 @@ class PlantFunctions:
                         continue
                     self._require_sense(after, error)
                 else:
-                    wanted = max(wanted, proposed)  # the interval's end may have cut the step short
+                    # the interval's end may have cut the step short
+                    wanted = proposed if h > 0.9 * wanted else max(wanted, proposed)
                     self._failures = 0
                 self._accept(time, after)
                 time = after
@@ -197,6 +197,8 @@ class PlantFunctions:
 
     def _solved(self, k: int, time: float, guess: FloatArray, bound: FloatArray) -> FloatArray:
         """p of one player after the step: p = known + weight f(t, x, v, u(p)); NaN where none is found."""
+        from scipy.optimize import root  # which most runs do not need
+
         known, weight = self._known_p[k], self._weight
         position = self._actions(self._known_p, self._known_x)[k] if self._second[k] else None
 

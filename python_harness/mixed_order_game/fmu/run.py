@@ -188,9 +188,11 @@ class Simulator:
     Raises what read_model raises, SimulationError if the FMU cannot be loaded on this machine.
     """
 
-    def __init__(self, fmu: GameSource = None, *, part: bool = False) -> None:
+    _holds_all_players = True
+
+    def __init__(self, fmu: GameSource = None) -> None:
         self.model: Model = read_model(fmu)
-        if not part:
+        if self._holds_all_players:
             self.model.require_all_players()
         self._outside: dict[tuple[int, ...], Simulator] = {}
         self._initial: Mapping[str, Value] = {}  # of plants that a game has and functions replace
