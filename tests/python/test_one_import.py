@@ -18,7 +18,7 @@ from mixed_order_game.studies.sampler import Settings
 
 GAME = "energy_consumption"
 FUNCTIONS = [name for name in dir(mog) if inspect.isfunction(getattr(mog, name))]
-METHODS: list[Any] = [mog.Result.plot, mog.Game, mog.Validation.plot]
+METHODS: list[Any] = [mog.Result.plot, mog.Game]
 DOCUMENTED = [getattr(mog, name) for name in FUNCTIONS if name != "package_version"] + METHODS
 
 
