@@ -49,7 +49,9 @@ def release(jobs: int, platforms: Sequence[str]) -> None:
     for interpreter in pythons():
         commands = tried(everywhere, interpreter)
     make_fmus(commands, arm="aarch64-linux" in platforms)
-    shutil.copytree(PLATFORMS / "licenses", OUTPUT / "licenses")
+    # the wheel of this machine has its C++ library, the other one those of the cross compiler
+    for licenses in (ROOT / "build" / "licenses", PLATFORMS / "licenses"):
+        shutil.copytree(licenses, OUTPUT / "licenses", dirs_exist_ok=True)
     files = sorted(path for path in OUTPUT.rglob("*") if path.is_file())
     sums = [f"{hashlib.sha256(path.read_bytes()).hexdigest()}  {path.relative_to(OUTPUT)}" for path in files]
     (OUTPUT / "SHA256SUMS").write_text("\n".join(sums) + "\n", encoding="utf-8")
