@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 import mixed_order_game as mog
-from tests.games_by_hand import BY_HAND
+from mixed_order_game.fmu.build import build_fmu
+from tests.games_by_hand import BY_HAND, fewer_households, two_hundred_households
 from tests.oracle.general_loop import GeneralLoop
 
 GAMES = Path(__file__).resolve().parents[2] / "modelDescription" / "games"
@@ -19,8 +20,19 @@ COLUMNS = 25  # of the states, drawn
     "name", sorted(set(BY_HAND) - {"two_hundred_households"})
 )  # which shows no estimates
 def test_rates_change_along_states_as_those_by_hand(name: str) -> None:
-    tables = tomllib.loads((GAMES / f"{name}.toml").read_text(encoding="utf-8"))
-    loop = GeneralLoop(tables, BY_HAND[name]())
+    text = (GAMES / f"{name}.toml").read_text(encoding="utf-8")
+    compare(name, GeneralLoop(tomllib.loads(text), BY_HAND[name]()))
+
+
+def test_those_of_the_first_forty_households_as_well(tmp_path: Path) -> None:
+    text = fewer_households(40)
+    game = tmp_path / "game.toml"
+    game.write_text(text, encoding="utf-8")
+    fmu = build_fmu(game, tmp_path / "game.fmu")
+    compare(fmu, GeneralLoop(tomllib.loads(text), two_hundred_households(40)))
+
+
+def compare(model: str | Path, loop: GeneralLoop) -> None:
     random = np.random.default_rng(3)
     state = loop.initial_state()
     x, p, y, W = loop.unpack(state)
@@ -36,7 +48,7 @@ def test_rates_change_along_states_as_those_by_hand(name: str) -> None:
             if letter != "W":
                 start[f"{stem}0{entry}"] = float(value)
     chosen = np.sort(random.choice(len(names), COLUMNS, replace=False))
-    with mog.Simulator(name) as simulator:
+    with mog.Simulator(model) as simulator:
         found = simulator.jacobian(names, start, along=[names[k] for k in chosen])
     for column, k in enumerate(chosen):
         step = np.zeros_like(state)
