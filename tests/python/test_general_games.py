@@ -18,8 +18,17 @@ from mixed_order_game.fmu.build import build_fmu
 from tests.games_by_hand import BY_HAND
 from tests.oracle.general_loop import Functions, GeneralLoop, equilibrium
 from tests.random_expressions import SMOOTH, random_game
+from tests.switching_games import JUMPS, switching_game
+from tests.switching_games import compare as compare_switching
 
 GAMES = Path(__file__).resolve().parents[2] / "modelDescription" / "games"
+# fmt: off
+FUNCTIONS = [
+    "abs", "sqrt", "exp", "expm1", "log", "log1p", "sin", "cos", "tan", "asin", "acos", "atan",
+    "atan2", "sinh", "cosh", "tanh", "erf", "hypot", "min", "max", "sign", "floor", "mod", "if",
+    "sum", "prod", "square", "pulse", "noise",
+]
+# fmt: on
 SIZES = [(2, 2), (3, 3), (4, 1), (5, 2), (6, 2), (8, 1), (12, 1), (2, 3), (3, 1), (4, 2)]
 SEEDS = range(1, 21)
 
@@ -67,6 +76,22 @@ def test_random_games_move_as_the_functions_made_with_them(seed: int, tmp_path: 
     compare(game, made.functions, 1.0, tmp_path)
 
 
-def test_random_games_use_every_function() -> None:
-    used = set[str]().union(*(random_game(seed, *SIZES[seed % len(SIZES)]).used for seed in SEEDS))
-    assert used == set(SMOOTH)
+@pytest.mark.parametrize("seed", range(len(JUMPS)))
+def test_random_games_that_switch_do_so_as_often_as_the_functions_made_with_them(
+    seed: int, tmp_path: Path
+) -> None:
+    seen = compare_switching(switching_game(seed, 2 + seed % 3, 1 + seed % 2), tmp_path)
+    assert seen.difference < 2e-5
+    assert seen.events[0] == seen.events[1] > 0
+
+
+def test_the_games_are_thirty_and_use_every_function() -> None:
+    made = [random_game(seed, *SIZES[seed % len(SIZES)]) for seed in SEEDS]
+    assert len(BY_HAND) + len(made) == 30
+    assert {size[0] for size in SIZES} >= {2, 12}
+    assert {size[1] for size in SIZES} == {1, 2, 3}
+    assert set[str]().union(*(game.used for game in made)) == set(SMOOTH)
+    texts = [(GAMES / f"{name}.toml").read_text(encoding="utf-8") for name in BY_HAND]
+    texts += [game.text for game in made]
+    texts += [switching_game(seed, 2, 1).text for seed in range(len(JUMPS))]
+    assert [name for name in FUNCTIONS if not any(f"{name}(" in text for text in texts)] == []
