@@ -58,9 +58,29 @@ def reference(description: Path) -> exercise.Run:
     return run("linux64", description)
 
 
-def run(platform: str, description: Path) -> exercise.Run:
+def run(platform: str, description: Path, game: Path = build_all.GAME) -> exercise.Run:
     host = FOLDER / platform / ("host.exe" if platform == "win64" else "host")
-    return exercise.exercise(platform, host, library(platform), description, build_all.GAME)
+    return exercise.exercise(platform, host, library(platform), description, game)
+
+
+EXPRESSION_GAMES = ("energy_peak_price", "switching_cooling")
+"""With erf, sqrt, sinh and cos; with square waves and noise."""
+
+
+@pytest.fixture(scope="module", params=EXPRESSION_GAMES)
+def general(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+    """A game with expressions, and its description by the native host tool."""
+    game = build_all.GAME.with_name(f"{request.param}.toml")
+    output = tmp_path_factory.mktemp("general") / "modelDescription.xml"
+    tool = FOLDER / "tools" / "linux64" / build_all.TOOL
+    subprocess.run([tool, "--output", output, game], check=True)
+    return game, output
+
+
+@pytest.fixture(scope="module")
+def general_reference(general: tuple[Path, Path]) -> exercise.Run:
+    game, output = general
+    return run("linux64", output, game)
 
 
 # the archives
@@ -139,6 +159,23 @@ def test_a_library_computes_what_linux64_computes(
     assert result.deserialized
     assert len(result.times) == 201
     assert exercise.compare(result, reference).largest <= PERMITTED
+
+
+@built
+@each_platform
+def test_a_library_computes_games_with_expressions_as_linux64_does(
+    platform: str, general: tuple[Path, Path], general_reference: exercise.Run
+) -> None:
+    try:
+        exercise.launcher(platform)
+    except PlatformError as reason:
+        pytest.skip(f"built, not run: {reason}")
+    game, output = general
+    result = run(platform, output, game)
+    assert result.restored
+    assert result.deserialized
+    assert len(result.times) == 201
+    assert exercise.compare(result, general_reference).largest <= PERMITTED
 
 
 @built
