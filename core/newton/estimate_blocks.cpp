@@ -8,6 +8,10 @@ namespace mixed_order_game {
 
 void EstimateBlocks::analyse(const CommunicationGraph& graph, const std::vector<Real>& k3, int dimension) {
   factored_ = 0.0;
+  if (has_analysed(graph, k3, dimension)) {
+    k3_ = k3[0];
+    return;
+  }
   players_ = graph.players();
   hosts_ = graph.hosts();
   dimension_ = dimension;
@@ -27,6 +31,22 @@ void EstimateBlocks::analyse(const CommunicationGraph& graph, const std::vector<
   } else {
     find_pattern(graph);
   }
+}
+
+/// Whether all is as it was, but for a common factor of k3.
+bool EstimateBlocks::has_analysed(const CommunicationGraph& graph, const std::vector<Real>& k3, int dimension) const {
+  if (players_ != graph.players() || hosts_ != graph.hosts() || dimension_ != dimension ||
+      directed_ != graph.directed()) {
+    return false;
+  }
+  for (int h = 0; h < hosts_; ++h) {
+    const Real row = directed_ ? k3[at(h)] / k3[0] : std::sqrt(k3[at(h)] / k3[0]);
+    if (row != row_[at(h)]) return false;
+    for (int j = 0; j < players_; ++j) {
+      if (seen_[at(h * players_ + j)] != row * graph.weight(graph.host(h), j)) return false;
+    }
+  }
+  return true;
 }
 
 void EstimateBlocks::find_eigenvectors(const CommunicationGraph& graph) {

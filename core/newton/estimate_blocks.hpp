@@ -36,6 +36,7 @@ class EstimateBlocks {
 
  private:
   [[nodiscard]] bool by_eigenvectors() const { return hosts_ <= most_players_by_eigenvectors && !directed_; }
+  [[nodiscard]] bool has_analysed(const CommunicationGraph& graph, const std::vector<Real>& k3, int dimension) const;
   void find_pattern(const CommunicationGraph& graph);
   void find_eigenvectors(const CommunicationGraph& graph);
   void factor_tiles(Real gamma_k3);

@@ -21,6 +21,8 @@ namespace mixed_order_game {
 
 namespace {
 
+bool are_same(const SparseRows& a, const SparseRows& b) { return a.start == b.start && a.column == b.column; }
+
 class StructuredNewton final : public NewtonSolver {
  public:
   void refresh(const LoopJacobian& jacobian) override;
@@ -28,6 +30,7 @@ class StructuredNewton final : public NewtonSolver {
   void solve(Real* b) override;
 
  private:
+  void find_pattern();
   void factor_weights();
   void factor_reduced();
   void apply_hessian(const std::vector<int>& rows, const Real* dy);
@@ -38,6 +41,10 @@ class StructuredNewton final : public NewtonSolver {
   Real gamma_ = 0.0;
   EstimateBlocks blocks_;
   std::optional<ReducedSystem> reduced_;
+
+  // what the pattern follows from, which a change of most parameters leaves as it is
+  Shape shape_;
+  SparseRows hessian_, dynamics_, by_velocity_;
 
   // sizes
   int n_ = 0;                         // H D, own entries
@@ -83,11 +90,24 @@ class StructuredNewton final : public NewtonSolver {
 void StructuredNewton::refresh(const LoopJacobian& jacobian) {
   jacobian_ = &jacobian;
   const Parameters& parameters = loop().parameters();
-  const Shape& shape = parameters.shape;
+  blocks_.analyse(parameters.graph, loop().gains().k3, parameters.shape.dimension);
+  if (reduced_ && shape_ == parameters.shape && are_same(hessian_, parameters.cost->hessian_pattern()) &&
+      are_same(dynamics_, parameters.dynamics->jacobian_pattern()) &&
+      are_same(by_velocity_, parameters.dynamics->velocity_pattern())) {
+    return;
+  }
+  shape_ = parameters.shape;
+  hessian_ = parameters.cost->hessian_pattern();
+  dynamics_ = parameters.dynamics->jacobian_pattern();
+  by_velocity_ = parameters.dynamics->velocity_pattern();
+  find_pattern();
+}
+
+void StructuredNewton::find_pattern() {
+  const Shape& shape = loop().shape();
   const StateLayout& layout = loop().layout();
   n_ = shape.own_entries();
   joint_ = shape.actions();
-  blocks_.analyse(parameters.graph, loop().gains().k3, shape.dimension);
   for (std::vector<int>* numbers : {&host_, &shared_unknown_, &action_unknown_, &x_, &reference_, &velocity_driven_,
                                     &accelerated_, &all_, &entry_}) {
     numbers->clear();
@@ -133,9 +153,9 @@ void StructuredNewton::refresh(const LoopJacobian& jacobian) {
 
   // the reduced system's sparse pattern
   std::vector<std::vector<int>> rows(at(unknowns));
-  const SparseRows& hessian = parameters.cost->hessian_pattern();
-  const SparseRows& dynamics = parameters.dynamics->jacobian_pattern();
-  const SparseRows& by_velocity = parameters.dynamics->velocity_pattern();
+  const SparseRows& hessian = hessian_;
+  const SparseRows& dynamics = dynamics_;
+  const SparseRows& by_velocity = by_velocity_;
   hessian_gain_.clear();
   for (int p = 0; p < n_; ++p) {
     for (int k = hessian.start[at(p)]; k < hessian.start[at(p + 1)]; ++k) {

@@ -122,7 +122,7 @@ TEST_P(StructuredNewtonOnGraphs, FromStarToCompleteGraph) {
 
 INSTANTIATE_TEST_SUITE_P(ByModesAndByElimination, StructuredNewtonOnGraphs, ::testing::Values(7, 11, 18));
 
-TEST(StructuredNewtonRefresh, FollowsNewEdgesAndCouplings) {
+TEST(StructuredNewtonRefresh, FollowsNewEdgesCouplingsAndGains) {
   const PlainGame before = random_game({.seed = 31, .players = 5, .dimension = 2, .neurons = 3});
   ClosedLoop loop(parse_game(toml_of(before)).parameters);
   LoopJacobian jacobian(loop);
@@ -145,17 +145,27 @@ TEST(StructuredNewtonRefresh, FollowsNewEdgesAndCouplings) {
       loop.parameters().cost->coefficients[QuadraticCost::coupling][at(i * 5 + j)] = 0.3;
     }
   }
-  loop.refresh();
-  jacobian.refresh();
-  structured->refresh(jacobian);
-  const auto dense = make_dense_newton();
-  linearize();
-  ASSERT_TRUE(structured->factor(jacobian, 2e-3));
-  ASSERT_TRUE(dense->factor(jacobian, 2e-3));
-  std::vector<Real> expected = rate;
-  dense->solve(expected.data());
-  structured->solve(rate.data());
-  EXPECT_LE(distance(rate, expected), 1e-12 * norm(expected));
+  const auto expect_followed = [&](const char* change) {
+    loop.refresh();
+    jacobian.refresh();
+    structured->refresh(jacobian);
+    const auto dense = make_dense_newton();
+    linearize();
+    ASSERT_TRUE(structured->factor(jacobian, 2e-3));
+    ASSERT_TRUE(dense->factor(jacobian, 2e-3));
+    std::vector<Real> expected = rate;
+    dense->solve(expected.data());
+    structured->solve(rate.data());
+    EXPECT_LE(distance(rate, expected), 1e-12 * norm(expected)) << change;
+  };
+  expect_followed("edges and couplings");
+  for (Real& k3 : loop.parameters().gains.k3) k3 *= 1.5;
+  loop.parameters().gains.k1[0] = 3.0;
+  expect_followed("k3 of all, k1");
+  loop.parameters().gains.k3[2] *= 2.0;
+  expect_followed("k3 of one");
+  loop.parameters().graph.set_weight(1, 3, 0.2);
+  expect_followed("an edge");
 }
 
 }  // namespace
