@@ -31,6 +31,7 @@ from tests.oracle.game import FloatArray, read_game
 from tests.oracle.general_loop import Functions, GeneralLoop
 
 from . import report
+from .change_cost import change_cost
 from .expression_games import (
     aggregative,
     five_vehicles,
@@ -331,6 +332,23 @@ def overhead(context: Context) -> Result:
     }
 
 
+def sweep(context: Context) -> Result:
+    """A run of a sweep against one fmi2DoStep over the horizon, and two processes against one."""
+    own = ROOT / ".venv" / "bin" / "python"
+    if not own.exists():
+        raise FileNotFoundError(f"{own} is missing: ./dev build makes it")
+    words = [own, "-m", "tests.bench.sweep_cost", "--graphs", 100 if context.quick else 728, "--rounds", 3]
+    done = subprocess.run([str(word) for word in words], check=True, capture_output=True, text=True, cwd=ROOT)
+    return dict(json.loads(done.stdout))
+
+
+def changes(context: Context) -> Result:
+    """What a step costs before which an input, a gain or an edge changes."""
+    if not context.fmu.exists():
+        raise FileNotFoundError(f"{context.fmu} is missing: ./dev build makes it")
+    return change_cost(context.fmu, context.scratch, 3 if context.quick else 11)
+
+
 def microbench(context: Context) -> Result:
     """Right-hand side, set-up and solve, against the machine's measured peak."""
     games = {"paper": PAPER_GAME}
@@ -489,6 +507,8 @@ PARTS: dict[str, Callable[[Context], Result]] = {
     "expressions": expressions,
     "general": general,
     "overhead": overhead,
+    "sweep": sweep,
+    "changes": changes,
     "microbench": microbench,
 }
 

@@ -30,7 +30,18 @@ def _verdict(value: float, bound: float, *, at_least: bool) -> str:
 def markdown(results: Results) -> str:
     """All parts that have results, as Markdown."""
     lines: list[str] = []
-    for part in ("paired", "precision", "scaling", "expressions", "general", "overhead", "microbench"):
+    parts = (
+        "paired",
+        "precision",
+        "scaling",
+        "expressions",
+        "general",
+        "overhead",
+        "sweep",
+        "changes",
+        "microbench",
+    )
+    for part in parts:
         if part in results:
             lines += globals()[f"_{part}"](results[part])
     if results:
@@ -260,6 +271,52 @@ def _overhead(result: Results) -> list[str]:
         " same steps, interpolations and outputs, rtol 1e-6; CPU milliseconds per run, medians of pairs.",
         "",
         *_table(["", "FMU's ms", "core's ms", "overhead", "target, %"], rows),
+    ]
+
+
+def _sweep(result: Results) -> list[str]:
+    row = [
+        str(result["graphs"]),
+        _milliseconds(result["step"]),
+        _milliseconds(result["run"]),
+        f"**{result['ratio']:.2f}** ({_verdict(result['ratio'], 1.5, at_least=False)})",
+        f"**{result['speedup']:.2f}** ({_verdict(result['speedup'], 1.85, at_least=True)})",
+    ]
+    return [
+        "## What a sweep costs",
+        "",
+        "Connected graphs of the paper's example: CPU time of a run of the sweep in one process, with the"
+        " processes' starts and the files, beside that of one fmi2DoStep over the horizon for the same"
+        " graphs; then wall time of one process over that of two. The FMU judges the run itself, so that a"
+        " run is a handful of calls. Medians of pairs.",
+        "",
+        *_table(["graphs", "fmi2DoStep, ms", "a run, ms", "ratio", "two processes, times one"], [row]),
+    ]
+
+
+def _changes(result: Results) -> list[str]:
+    bounds = {"an input": 15.0, "a gain": 30.0, "the weight of an edge": 30.0}
+    rows = []
+    for name, bound in bounds.items():
+        row = {key: 1e6 * value for key, value in result["rows"][name].items()}
+        rows.append(
+            [
+                name,
+                f"{row['idle']:.1f}",
+                f"{row['changed']:.1f}",
+                f"**{row['beyond']:.1f}**",
+                f"{row['changed'] / row['idle']:.1f}",
+                _verdict(row["beyond"], bound, at_least=False),
+            ]
+        )
+    return [
+        "## What changes cost",
+        "",
+        f"The paper's case over 20 s in steps of {1e3 * result['step']:g} ms, called from Python: a value set"
+        " before each step, by turns two different ones or always the same. CPU microseconds a step, medians"
+        " of pairs; what follows a change are steps of a Rosenbrock method instead of a start of CVODE.",
+        "",
+        *_table(["changed", "idle, us", "changed, us", "difference", "ratio", "target, us"], rows),
     ]
 
 

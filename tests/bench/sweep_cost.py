@@ -1,13 +1,14 @@
 """What a sweep costs beyond its runs: `python -m tests.bench.sweep_cost [--graphs 200] [--rounds 3]`.
 
 For connected graphs of the paper's example, alternately: CPU time of a sweep in one process and of one
-fmi2DoStep over the horizon for each graph; then wall time of two processes beside one. Prints a Markdown
-table, medians.
+fmi2DoStep over the horizon for each graph; then wall time of two processes beside one. Prints medians as
+JSON, times in s. Needs the package, so that the environment of the benchmarks starts it in the project's own.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
 import resource
 import statistics
 import tempfile
@@ -41,11 +42,9 @@ def main() -> None:
         swept.append(cpu / len(definition.graphs))
         ratios.append(swept[-1] / runs)
         speedups.append(wall / wall_of_two)
-    print("| graphs | fmi2DoStep, ms | a run of the sweep, ms | ratio | two processes, times one |")
-    print("|---|---|---|---|---|")
-    ms = [1e3 * statistics.median(each) for each in (alone, swept)]
-    ratio, speedup = statistics.median(ratios), statistics.median(speedups)
-    print(f"| {len(definition.graphs)} | {ms[0]:.2f} | {ms[1]:.2f} | {ratio:.2f} | {speedup:.2f} |")
+    measured = {"step": alone, "run": swept, "ratio": ratios, "speedup": speedups}
+    medians = {name: statistics.median(values) for name, values in measured.items()}
+    print(json.dumps({"graphs": len(definition.graphs), **medians}))
 
 
 def steps_alone(graphs: tuple[CommunicationGraph, ...]) -> float:
