@@ -93,7 +93,8 @@ def sensitivities(
         Time between samples in s; the last one is shorter if the horizon is not a multiple of it.
     tolerance
         Relative tolerance of the integrator, between 0 and 1. Errors of the derivatives fall with it, but are
-        not controlled themselves.
+        not controlled themselves: take 1e-9 or less where controls are bounded, or costs or dynamics have
+        abs, min or max.
 
     Returns
     -------
