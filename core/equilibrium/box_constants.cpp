@@ -38,13 +38,15 @@ bool is_proof(const Enclosure::Found& found) {
 
 Real middle_of(const Interval& side) { return 0.5 * side.lower + 0.5 * side.upper; }
 
+/// Of a box, with an upper bound of a quantity there.
+struct Part {
+  Box box;
+  Real bound;
+};
+
 /// Covers a box by parts on which an upper bound of a quantity is close to the largest sample, as far as the work
 /// allows: the part with the largest bound is cut along the action that moves it most.
-std::vector<Box> parts_of(const Box& whole, const std::function<Real(const Box&)>& bound, Real sampled) {
-  struct Part {
-    Box box;
-    Real bound;
-  };
+std::vector<Part> parts_of(const Box& whole, const std::function<Real(const Box&)>& bound, Real sampled) {
   const auto is_less = [](const Part& a, const Part& b) { return a.bound < b.bound; };
   std::vector<Part> parts{{whole, bound(whole)}};
   std::vector<Real> influence(whole.size(), 0.0);
@@ -82,14 +84,12 @@ std::vector<Box> parts_of(const Box& whole, const std::function<Real(const Box&)
     for (const bool first : {true, false}) {
       Box half = whole_part.box;
       (first ? half[cut].upper : half[cut].lower) = middle;
-      const Real bound_there = std::min(whole_part.bound, bound(half));
+      const Real bound_there = std::min(whole_part.bound, bound(half));  // that of a smaller box may be the larger one
       parts.push_back({std::move(half), bound_there});
       std::push_heap(parts.begin(), parts.end(), is_less);
     }
   }
-  std::vector<Box> boxes;
-  for (Part& part : parts) boxes.push_back(std::move(part.box));
-  return boxes;
+  return parts;
 }
 
 /// An upper bound of the 2-norms of all matrices of D x n intervals.
@@ -202,13 +202,14 @@ JacobianBounds jacobian_bounds(const Shape& shape, const Box& box, const std::ve
       return is_proof(rows_over(i, part, rows)) ? norm_bound(rows, D) : infinite;
     };
     Real proved = 0.0;
-    for (const Box& part : parts_of(box, bound, sampled[at(i)])) {
-      proved = std::max(proved, bound(part));
+    for (const Part& part : parts_of(box, bound, sampled[at(i)])) {
+      const bool is_proved = is_proof(rows_over(i, part.box, rows));
+      proved = std::max(proved, part.bound);
       for (int l = 0; l < D; ++l) {
         for (std::size_t k = 0; k < n; ++k) {
           Interval& entry = bounds.entries[at(shape.entry(i, l)) * n + k];
           const Interval& there = rows[at(l) * n + k];
-          if (!std::isfinite(proved)) {
+          if (!is_proved || !std::isfinite(proved)) {
             entry = {};
           } else {
             entry = {std::min(entry.lower, there.lower), std::max(entry.upper, there.upper)};
@@ -390,11 +391,11 @@ BoxConstants box_constants(const Parameters& parameters, const GameExpressions& 
     return -least_eigenvalue(jacobian, static_cast<Eigen::Index>(n));
   };
   Real proved = -infinite;
-  for (const Box& part : parts_of(box, bound, -least)) {
+  for (const Part& part : parts_of(box, bound, -least)) {
     std::vector<Real> middle;
-    for (const Interval& side : part) middle.push_back(middle_of(side));
+    for (const Interval& side : part.box) middle.push_back(middle_of(side));
     take(middle);
-    proved = std::max(proved, bound(part));
+    proved = std::max(proved, part.bound);
   }
   constants.monotonicity = {-proved, least};
   for (int i = 0; i < shape.players; ++i) {

@@ -102,6 +102,13 @@ def test_bounds_of_the_example_games_hold_at_samples(name: str) -> None:
     check_samples(bounds, BY_HAND[name](), 5)
 
 
+def test_what_a_part_proves_its_halves_do_not_lose() -> None:
+    game = GAMES / "source_seeking.toml"
+    x_star = equilibrium_of(game)
+    bounds = game_bounds(game, box_around(x_star, 0.6), x_star)
+    assert bounds.monotonicity > 0.93 * bounds.sampled_monotonicity
+
+
 @pytest.mark.parametrize("seed", range(10))
 def test_bounds_of_random_games_hold_at_samples(seed: int, tmp_path: Path) -> None:
     made = random_game(seed, 2 + seed % 3, 1 + seed % 2)
