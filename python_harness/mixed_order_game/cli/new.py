@@ -20,7 +20,8 @@ def new(
         str,
         typer.Option(
             help="Communication graph: ring, path, star, wheel, complete, tree, random:P, regular:DEGREE, "
-            "small-world:K:P, scale-free:M, geometric:RADIUS, or edges such as 1-2,2-3:0.5 (weight 0.5).",
+            "small-world:K:P, scale-free:M, geometric:RADIUS, or edges such as 1-2,2-3:0.5 (weight 0.5); "
+            "directed:ring, directed:random:P, or 1>2,2>3,3>1, where 2 hears 1.",
             autocompletion=complete_graphs,
         ),
     ] = "ring",

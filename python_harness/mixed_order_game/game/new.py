@@ -239,6 +239,7 @@ class _Player:
 def _explained(lines: Iterable[str]) -> list[str]:
     """The first player's lines, each with a comment above it."""
     meanings = {
+        "name": 'A player may have gains, rbf and W0 of its own, u_max (bound of |u|), plant = "external"',
         "order": "1: velocity-driven, x_i' = u_i + g_i(x) + d_i(t); 2: acceleration-driven, v_i' = the same",
         "x0": "Initial action. Optional: z0 (order 1), v0 (order 2), y0. One number stands for D equal ones.",
         "cost": "f_i = quadratic |x_i|^2 + linear . x_i + constant + sum of c_ij |x_i - x_j|^2, [j, c_ij]",
