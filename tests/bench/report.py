@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 Results = dict[str, Any]
+CHANGES = {"an input": 15.0, "a gain": 30.0, "the weight of an edge": 30.0}
+"""Microseconds beyond an idle step that are aimed at."""
 BEGIN, END = "<!-- benchmarks: begin -->", "<!-- benchmarks: end -->"
 
 
@@ -295,9 +299,8 @@ def _sweep(result: Results) -> list[str]:
 
 
 def _changes(result: Results) -> list[str]:
-    bounds = {"an input": 15.0, "a gain": 30.0, "the weight of an edge": 30.0}
     rows = []
-    for name, bound in bounds.items():
+    for name, bound in CHANGES.items():
         row = {key: 1e6 * value for key, value in result["rows"][name].items()}
         rows.append(
             [
@@ -375,28 +378,35 @@ def insert(text: str, document: Path) -> None:
 
 
 def figure(results: Results, file: Path) -> None:
-    """Work-precision diagram, and time over the number of players."""
+    """Work-precision diagram, time over the number of players, and bars of what sweeps and changes cost."""
     import matplotlib as mpl
 
     mpl.use("Agg")
     import matplotlib.pyplot as plt
 
-    panels = [name for name in ("precision", "scaling") if name in results]
-    if not panels:
+    draw: dict[str, Callable[[Any], None]] = {}
+    if "precision" in results:
+        draw["precision"] = partial(_draw_precision, result=results["precision"])
+    if "scaling" in results:
+        draw["scaling"] = partial(_draw_scaling, result=results["scaling"])
+    if "sweep" in results and "changes" in results:
+        draw["costs"] = partial(_draw_costs, sweep=results["sweep"], changes=results["changes"])
+    if not draw:
         return
     plt.rcParams.update({"font.size": 9, "axes.spines.top": False, "axes.spines.right": False})
-    drawing, all_axes = plt.subplots(1, len(panels), figsize=(5.2 * len(panels), 3.9), squeeze=False)
-    for axes, panel in zip(all_axes[0], panels, strict=True):
-        axes.set_xscale("log")
-        axes.set_yscale("log")
+    drawing, all_axes = plt.subplots(1, len(draw), figsize=(5.2 * len(draw), 3.9), squeeze=False)
+    for axes, panel in zip(all_axes[0], draw.values(), strict=True):
         axes.grid(visible=True, which="major", linewidth=0.4, color="0.85")
-        (_draw_precision if panel == "precision" else _draw_scaling)(axes, results[panel])
+        axes.set_axisbelow(True)
+        panel(axes)
     drawing.tight_layout()
     drawing.savefig(file, dpi=120)
     plt.close(drawing)
 
 
 def _draw_precision(axes: Any, result: Results) -> None:
+    axes.set_xscale("log")
+    axes.set_yscale("log")
     colors = ["#0072B2", "#D55E00", "#E69F00", "#CC79A7", "#009E73", "#56B4E9", "#999999", "#000000"]
     for (name, curve), color, marker in zip(result["curves"].items(), colors, "os^vDP*X", strict=False):
         own = name == "this core"
@@ -418,6 +428,8 @@ def _draw_precision(axes: Any, result: Results) -> None:
 
 
 def _draw_scaling(axes: Any, result: Results) -> None:
+    axes.set_xscale("log")
+    axes.set_yscale("log")
     players = [row["players"] for row in result["rows"]]
     axes.plot(players, [1e3 * row["cpu"] for row in result["rows"]], "o-", color="#0072B2", label="this core")
     klu = result["klu"]
@@ -432,3 +444,23 @@ def _draw_scaling(axes: Any, result: Results) -> None:
     axes.set_ylabel("CPU time, ms")
     axes.set_title(f"Scaling family, 10 s (exponent {result['exponent_20_to_100']:.2f} from 20 to 100)")
     axes.legend(fontsize=7, frameon=False)
+
+
+def _draw_costs(axes: Any, sweep: Results, changes: Results) -> None:
+    """Each figure in parts of what is aimed at, so that shorter is better."""
+    bars = {
+        "a sweep's run / fmi2DoStep": (sweep["ratio"], 1.5, "{:.2f}"),
+        "two processes / half of one": (2.0 / sweep["speedup"], 2.0 / 1.85, "{:.2f}"),
+    }
+    for name, bound in CHANGES.items():
+        bars[f"{name} changed, us"] = (1e6 * changes["rows"][name]["beyond"], bound, "{:.0f}")
+    for k, (value, bound, form) in enumerate(bars.values()):
+        color = "#0072B2" if value <= bound else "#D55E00"
+        axes.barh(k, value / bound, height=0.6, color=color)
+        axes.text(0.03, k, form.format(value), color="white", va="center", fontsize=8)
+    axes.axvline(1.0, color="black", linewidth=1.0)
+    axes.set_yticks(range(len(bars)), list(bars))
+    axes.invert_yaxis()
+    axes.grid(visible=False, axis="y")
+    axes.set_xlabel("in parts of what is aimed at")
+    axes.set_title("Sweeps, and changes every 20 ms")
