@@ -523,7 +523,7 @@ void Integrator::Implementation::take_step() {
          "the steps that the relative tolerance " + number_text(tolerances_.relative) +
              " asks for fell below the resolution of time");
   }
-  if (follower_ != nullptr) {
+  if (follower_ != nullptr && internal_time_ > before) {  // it has seen a stop time that CVODE tells of late
     int order = 1;
     CVodeGetLastOrder(cvode_.get(), &order);
     follower_->step(internal_time_, order, N_VGetArrayPointer(vector_.get()), modes_);
