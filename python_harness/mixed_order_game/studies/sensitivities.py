@@ -151,11 +151,20 @@ def sensitivities(
             if message.startswith(TOOL):
                 raise SimulationError(message.removeprefix(TOOL)) from error
             raise VariableError(message.removeprefix(f"{file}: ")) from error
+    derivatives = {
+        name: np.array(each, dtype=np.float64) for name, each in zip(names, told["x_along"], strict=True)
+    }
+    for name, each in derivatives.items():  # in JSON, what is not finite is null
+        finite = np.isfinite(each.reshape(len(time), -1)).all(axis=1)
+        if not finite.all():
+            raise SimulationError(
+                f"the derivatives by {name} are not finite at t = {time[np.argmin(finite)]:g} s"
+            )
     return Sensitivities(
         time=time,
         x=np.array(told["x"]),
         x_star=np.array(told["x_star"]),
-        derivatives=dict(zip(names, map(np.array, told["x_along"]), strict=True)),
+        derivatives=derivatives,
         x_star_derivatives=dict(zip(names, map(np.array, told["x_star_along"]), strict=True)),
         units={name: _unit_of_derivative(model.variable(name).unit) for name in names},
         parameters=values,
