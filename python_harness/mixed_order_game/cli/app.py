@@ -22,7 +22,7 @@ from .demo import demo
 from .explore import explore
 from .info import info
 from .new import new
-from .panels import Command, PlainFlags, grouped, help_of
+from .panels import Command, PlainTypes, grouped, help_of
 from .periods import periods
 from .plot import plot
 from .report import report
@@ -35,7 +35,7 @@ from .validate import validate
 from .verbosity import with_verbosity
 
 
-class ErrorsAsSentences(PlainFlags, typer.core.TyperGroup):
+class ErrorsAsSentences(PlainTypes, typer.core.TyperGroup):
     """Prints the package's own exceptions as one sentence on stderr and exits with 1; Ctrl-C gives 130."""
 
     def invoke(self, ctx: Any) -> Any:

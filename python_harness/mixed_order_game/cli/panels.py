@@ -1,7 +1,8 @@
-"""How help looks: each option under the same heading in every command, paragraphs as wide as the terminal."""
+"""How help looks: each option under the same heading in every command, nothing cut on a narrow terminal."""
 
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any, get_args
 
 import typer.core
@@ -34,14 +35,35 @@ PANELS = {
 """Options by their parameters' names; others, --help among them, stand under Options."""
 
 
+VALUES = {Path: "PATH", float: "NUMBER", int: "INTEGER", str: "TEXT"}
+"""What help calls the value of an option that has no word of its own for it."""
+
+LEAST_WIDTH = 80
+"""Width in characters from which Typer's tables of options cut no name."""
+
+
 def grouped(command: Callable[..., None]) -> Callable[..., None]:
-    """The command, its options put under their headings."""
+    """The command, its options put under their headings and their values named."""
     headings = {name: heading for heading, names in PANELS.items() for name in names}
     for name, parameter in inspect.signature(command).parameters.items():
-        for each in get_args(parameter.annotation)[1:]:
-            if isinstance(each, OptionInfo) and name in headings:
+        annotated, *infos = get_args(parameter.annotation)
+        for each in infos:
+            if not isinstance(each, OptionInfo):
+                continue
+            if name in headings:
                 each.rich_help_panel = headings[name]
+            if each.metavar is None:
+                each.metavar = next((VALUES[part] for part in _parts(annotated) if part in VALUES), None)
     return command
+
+
+def _parts(annotation: Any) -> Iterator[Any]:
+    """The types that a type is made of: list[Path] | None of Path and None."""
+    inner = get_args(annotation)
+    if not inner:
+        yield annotation
+    for each in inner:
+        yield from _parts(each)
 
 
 def help_of(command: Callable[..., None]) -> str:
@@ -49,17 +71,29 @@ def help_of(command: Callable[..., None]) -> str:
     return "\n\n".join(" ".join(part.split("\n")) for part in (inspect.getdoc(command) or "").split("\n\n"))
 
 
-class PlainFlags:
-    """Of commands and groups: options that take no value name no type in help."""
+class PlainTypes:
+    """Of commands and groups: help names no type of an option without value, and no Python type."""
 
     def get_params(self, ctx: Any) -> Any:
-        """The parameters, flags without the name of a type."""
+        """The parameters; arguments are described by their texts alone."""
         params = super().get_params(ctx)  # type: ignore[misc]  # of Typer's class beside this one
         for each in params:
-            if getattr(each, "is_flag", False) and each.metavar is None:
+            if each.param_type_name == "argument":
+                each.display_type_rich = lambda **_: None
+            elif getattr(each, "is_flag", False) and each.metavar is None:
                 each.metavar = ""
         return params
 
 
-class Command(PlainFlags, typer.core.TyperCommand):
-    """A command whose flags name no type in help."""
+class Command(PlainTypes, typer.core.TyperCommand):
+    """A command whose help fits the terminal."""
+
+    def format_help(self, ctx: Any, formatter: Any) -> None:
+        """Typer's plain help where its tables would cut the names of options."""
+        from rich.console import Console
+        from rich.text import Text
+
+        if Console().width < LEAST_WIDTH:
+            self.rich_markup_mode = None
+            self.help = Text.from_markup(self.help or "").plain
+        super().format_help(ctx, formatter)

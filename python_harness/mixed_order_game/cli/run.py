@@ -41,8 +41,8 @@ def run(
         typer.Option(
             metavar="NAMES",
             autocompletion=complete_variables,
-            help="Variables to record, separated by commas; x stands for every x\\[i,l]; repeatable. "
-            "All outputs and locals but y, W and time derivatives when left out.",
+            help="Variables to record, separated by commas; x stands for x[1,1], x[1,2] and so on; "
+            "repeatable. All outputs and locals but y, W and time derivatives when left out.",
         ),
     ] = None,
     graph_schedule: Annotated[
