@@ -40,6 +40,7 @@ def printed(width: int) -> str:
 def test_no_word_is_lost(width: int) -> None:
     text = printed(width)
     assert max(map(len, text.splitlines())) <= width
+    assert not re.search(" +$", text, re.MULTILINE)
     assert "…" not in text
     words = set(re.findall(r"[\w.+-]+", text))
     if width >= 40:  # a line for each column needs room for two words
@@ -52,7 +53,8 @@ def test_where_there_is_no_terminal_lines_are_whole(command: list[str], fmu: Pat
     stop = [] if name == "info" else ["--stop-time", "0.1"]
     done = CliRunner(env={"COLUMNS": "30"}).invoke(cli.app, [name, str(fmu), *options, *stop])
     assert done.exit_code == 0, done.output
-    lines = [line.rstrip() for line in done.stdout.splitlines()]
+    lines = done.stdout.splitlines()
+    assert [line for line in lines if line.endswith(" ")] == []
     expected = {
         "compare": r"run +settling time \(s\) +overshoot +control energy +control peak +final error +events",
         "run": r"  5 +-?[\d.]+, -?[\d.]+ +-?[\d.]+, -?[\d.]+ +-0.5, -0.5 +[\d.e+-]+",

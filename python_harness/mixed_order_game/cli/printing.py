@@ -1,6 +1,8 @@
 """How commands print tables: nothing is cut, on no narrow terminal and not where there is no terminal."""
 
-from rich.console import Console
+import re
+
+from rich.console import Console, RenderableType
 from rich.measure import Measurement
 from rich.table import Table
 from rich.text import Text
@@ -21,7 +23,7 @@ def show(table: Table, console: Console | None = None) -> None:
     for column in table.columns:
         column.overflow, column.no_wrap = "fold", False
     if _fit(table, console) or not table.show_header:
-        console.print(table)
+        _print(table, console)
         return
     if table.title is not None:
         console.print(table.title)
@@ -31,8 +33,18 @@ def show(table: Table, console: Console | None = None) -> None:
             record.add_row(column.header, cell)
         for part in record.columns:
             part.overflow = "fold"
-        console.print(record)
+        _print(record, console)
         console.print(Text())
+
+
+def _print(grid: RenderableType, console: Console) -> None:
+    """Print a grid; where there is no terminal, without the blanks that make all its lines equally long."""
+    if console.is_terminal:
+        console.print(grid)
+        return
+    with console.capture() as captured:
+        console.print(grid)
+    console.out(re.sub(" +\n", "\n", captured.get()), end="", highlight=False)
 
 
 def _fit(table: Table, console: Console) -> bool:
