@@ -1,7 +1,7 @@
 """Communication graphs: networkx generators, all connected labelled graphs, and the FMU's edges a[i,j]."""
 
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations
@@ -192,6 +192,15 @@ def _connected(players: int, edges: Iterable[tuple[int, int]]) -> bool:
 
 Generator = Callable[[int, list[float], int], Any]
 
+ARGUMENTS: dict[str, tuple[str, Callable[[float], bool]]] = {
+    "P": ("a probability from 0 to 1", lambda value: 0.0 <= value <= 1.0),
+    "DEGREE": ("a whole number", float.is_integer),
+    "K": ("a whole number", float.is_integer),
+    "M": ("a whole number", float.is_integer),
+    "RADIUS": ("a positive distance", lambda value: 0.0 < value < np.inf),
+}
+"""The numbers that kinds of graphs take, named as in graph_kinds: what is expected, and whether one is it."""
+
 
 def _fixed(name: str) -> Generator:
     import networkx as nx
@@ -200,25 +209,29 @@ def _fixed(name: str) -> Generator:
     return lambda players, _arguments, _seed: function(players)
 
 
-def _generators() -> dict[str, tuple[int, bool, Generator]]:
-    """Name -> number of arguments, random or not, function of (players, arguments, seed)."""
+def _generators() -> dict[str, tuple[tuple[str, ...], bool, Generator]]:
+    """Name -> names of its arguments, random or not, function of (players, arguments, seed)."""
     import networkx as nx
 
     return {
-        "ring": (0, False, _fixed("cycle_graph")),
-        "path": (0, False, _fixed("path_graph")),
-        "complete": (0, False, _fixed("complete_graph")),
-        "wheel": (0, False, _fixed("wheel_graph")),
-        "star": (0, False, lambda n, _, __: nx.star_graph(n - 1)),
-        "tree": (0, True, lambda n, _, seed: nx.random_labeled_tree(n, seed=seed)),
-        "random": (1, True, lambda n, a, seed: nx.gnp_random_graph(n, a[0], seed=seed)),
-        "regular": (1, True, lambda n, a, seed: nx.random_regular_graph(int(a[0]), n, seed=seed)),
-        "small-world": (2, True, lambda n, a, seed: nx.watts_strogatz_graph(n, int(a[0]), a[1], seed=seed)),
-        "scale-free": (1, True, lambda n, a, seed: nx.barabasi_albert_graph(n, int(a[0]), seed=seed)),
-        "geometric": (1, True, lambda n, a, seed: nx.random_geometric_graph(n, a[0], seed=seed)),
-        "directed:ring": (0, False, lambda n, _, __: nx.cycle_graph(n, create_using=nx.DiGraph)),
+        "ring": ((), False, _fixed("cycle_graph")),
+        "path": ((), False, _fixed("path_graph")),
+        "complete": ((), False, _fixed("complete_graph")),
+        "wheel": ((), False, _fixed("wheel_graph")),
+        "star": ((), False, lambda n, _, __: nx.star_graph(n - 1)),
+        "tree": ((), True, lambda n, _, seed: nx.random_labeled_tree(n, seed=seed)),
+        "random": (("P",), True, lambda n, a, seed: nx.gnp_random_graph(n, a[0], seed=seed)),
+        "regular": (("DEGREE",), True, lambda n, a, seed: nx.random_regular_graph(int(a[0]), n, seed=seed)),
+        "small-world": (
+            ("K", "P"),
+            True,
+            lambda n, a, seed: nx.watts_strogatz_graph(n, int(a[0]), a[1], seed=seed),
+        ),
+        "scale-free": (("M",), True, lambda n, a, seed: nx.barabasi_albert_graph(n, int(a[0]), seed=seed)),
+        "geometric": (("RADIUS",), True, lambda n, a, seed: nx.random_geometric_graph(n, a[0], seed=seed)),
+        "directed:ring": ((), False, lambda n, _, __: nx.cycle_graph(n, create_using=nx.DiGraph)),
         "directed:random": (
-            1,
+            ("P",),
             True,
             lambda n, a, seed: nx.gnp_random_graph(n, a[0], seed=seed, directed=True),
         ),
@@ -256,15 +269,22 @@ def graphs_of_text(
         count = int(count_text) if count_text else 1
     except ValueError:
         raise GraphError(f"{text!r} is not a kind of graph with numbers after : and @") from None
-    if len(arguments) != needed:
-        raise GraphError(
-            f"{name} takes {needed} number{'s' * (needed != 1)} after a colon, not {len(arguments)}"
-        )
+    _judge_arguments(name, needed, arguments)
     if count < 1 or (count > 1 and not random):
         raise GraphError(f"{text!r}: the count is 1 for a kind that is not random, and positive for others")
     if not 2 <= players <= LARGEST_PLAYERS:  # noqa: PLR2004
         raise GraphError(f"graphs are made for 2 to {LARGEST_PLAYERS} players, not for {players}")
     return [_draw(text, players, generate, arguments, [seed, k], random=random) for k in range(count)]
+
+
+def _judge_arguments(name: str, needed: Sequence[str], values: Sequence[float]) -> None:
+    if len(values) != len(needed):
+        plural = "s" * (len(needed) != 1)
+        raise GraphError(f"{name} takes {len(needed)} number{plural} after a colon, not {len(values)}")
+    for argument, value in zip(needed, values, strict=True):
+        expected, suits = ARGUMENTS[argument]
+        if not suits(value):
+            raise GraphError(f"{argument} of {name} is {value:g}, expected {expected}")
 
 
 def _draw(
