@@ -148,10 +148,11 @@ def tried(wheel: Path, interpreter: Path) -> Path:
     version = subprocess.run(
         [commands / "python", "--version"], capture_output=True, text=True, check=True
     ).stdout
-    before = megabytes(environment)
+    before, before_bare = megabytes(environment)
     for extra in ("", "[plot]"):
         subprocess.run([commands / "python", *install, f"{wheel}{extra}"], check=True, env=index | bare)
-        size = megabytes(environment) - before
+        size, size_bare = megabytes(environment)
+        sizes = f"{size - before:.0f} MB, {size_bare - before_bare:.0f} without bytecode"
         began = time.monotonic()
         done = subprocess.run(
             [commands / "mog", "demo", "--output", WORK / f"demo{extra}"],
@@ -164,13 +165,18 @@ def tried(wheel: Path, interpreter: Path) -> Path:
         if done.returncode != 0:
             raise ReleaseError(f"mog demo of {wheel.name}{extra} failed: {done.stdout}{done.stderr}")
         seconds = time.monotonic() - began
-        say(f"{wheel.name}{extra}, {version.strip()}: installed {size:.0f} MB, demo in {seconds:.0f} s")
+        say(f"{wheel.name}{extra}, {version.strip()}: installed {sizes}, demo in {seconds:.0f} s")
     return commands
 
 
-def megabytes(folder: Path) -> float:
-    """Size of all files below a folder, bytecode included."""
-    return sum(path.lstat().st_size for path in folder.rglob("*") if not path.is_dir()) / 1e6
+def megabytes(folder: Path) -> tuple[float, float]:
+    """Size of all files below a folder, with the bytecode that pip compiles and without it."""
+    sizes = {
+        path: path.lstat().st_size / 1e6
+        for path in folder.rglob("*")
+        if not path.is_dir() and not path.is_symlink()
+    }
+    return sum(sizes.values()), sum(size for path, size in sizes.items() if path.suffix != ".pyc")
 
 
 def make_fmus(commands: Path, *, arm: bool) -> None:
