@@ -4,7 +4,7 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from itertools import groupby
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from rich.box import SIMPLE_HEAD as LINES
@@ -17,8 +17,11 @@ from ..fmu.parts import longest_sampled_step
 from ..game.definition import PARTS, NamedParameter, named_parameters
 from ..game.equilibrium import judge_equilibrium
 from ..results.result import Result
-from ..studies.validate import Validation, Verdict
+from ..studies.claims.verdict import Verdict
 from .printing import show, standard_output
+
+if TYPE_CHECKING:
+    from ..studies.validate import Validation  # whose claims bring SciPy
 
 LONGEST_LIST = 20
 
@@ -187,7 +190,7 @@ VERDICT_STYLES = {
 }
 
 
-def print_validation(validation: Validation) -> None:
+def print_validation(validation: "Validation") -> None:
     """Print every claim with its verdict and the reason."""
     console = standard_output()
     console.print(Text(validation.model.title, style="bold"))
@@ -197,7 +200,7 @@ def print_validation(validation: Validation) -> None:
     console.print(Text(validation.summary() + "."))
 
 
-def claims_table(validation: Validation) -> Table:
+def claims_table(validation: "Validation") -> Table:
     """Verdict, claim and reason, a row each; every cell wraps."""
     table = Table("", "claim", "reason", box=LINES)
     for claim in validation.claims:
