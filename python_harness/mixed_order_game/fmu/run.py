@@ -213,7 +213,7 @@ class Simulator:
     def _load(self, folder: Path) -> None:
         """Unpack, load the library and make an instance, which needs the files no longer."""
         try:
-            fmpy.extract(str(self.model.path), unzipdir=folder)
+            fmpy.extract(str(self.model.path), unzipdir=folder, include=_needed)
             self._callbacks = fmi2CallbackFunctions()
             self._callbacks.logger = fmi2CallbackLoggerTYPE(self._log)
             self._callbacks.allocateMemory = defaultCallbacks.allocateMemory
@@ -476,8 +476,8 @@ class Simulator:
         slave = self._ready(plants)
         schedule = schedule or {}
         asked = [] if disturbance is None else disturbance.times
-        points = np.union1d(time, [*schedule, *asked]).tolist()
         samples = time.tolist()
+        points = sorted({*samples, *schedule, *asked}) if schedule or asked else samples
         try:
             with noted_signals() as take_signals:
                 self._initialize(values, samples, tolerance)
@@ -605,6 +605,11 @@ class Simulator:
     def _said(self) -> str:
         """The last error that the FMU logged; empty if it logged none."""
         return next((text for status, text in reversed(self._messages) if status >= fmi2Discard), "")
+
+
+def _needed(name: str) -> bool:
+    """Whether an instance on this machine needs a file of the archive."""
+    return name.startswith((f"binaries/{fmpy.platform}/", "resources/"))
 
 
 class Recorder(Protocol):
