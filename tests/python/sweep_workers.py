@@ -5,8 +5,8 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
-from mixed_order_game.studies.pool import Case, Outcome, Source, run_chunk
 from mixed_order_game.studies.sampler import Settings
+from mixed_order_game.studies.worker import Case, Outcome, Source, run_chunk
 
 FOLDER = "MOG_TEST_FOLDER"
 """Environment variable: a folder in which the workers of one test leave what they did."""

@@ -64,6 +64,23 @@ def test_help_and_version_import_nothing_heavy(arguments: list[str]) -> None:
     assert done.stderr == "set()\n"
 
 
+@pytest.mark.parametrize(
+    ("statement", "unwanted"),
+    [
+        ("import mixed_order_game.studies.pool", {"asyncio", "importlib.metadata", "pyarrow", "scipy"}),
+        (
+            "import mixed_order_game.cli.tables; import mixed_order_game as mog; mog.run(stop_time=0.1)",
+            {"numpy.ma", "pyarrow", "rich.markdown", "scipy"},
+        ),
+    ],
+    ids=["worker of a sweep", "run"],
+)
+def test_what_runs_imports_only_what_it_needs(statement: str, unwanted: set[str]) -> None:
+    script = f"import sys; {statement}; print(sorted(sys.modules.keys() & {unwanted!r}))"
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert done.stdout == "[]\n"
+
+
 def test_every_public_name_is_there() -> None:
     assert {"Game", "Result", "run", "validate", "analyse", "sweep", "report"} <= set(dir(mog))
     for name in dir(mog):

@@ -17,7 +17,6 @@ from mixed_order_game import MixedOrderGameError, ModelError, PlotError, ResultE
 from mixed_order_game.game.graphs import GraphError, graphs_of_text
 from mixed_order_game.results.style import new_axes
 from mixed_order_game.studies.designs import DesignError, Range
-from mixed_order_game.studies.pool import PoolError
 from mixed_order_game.studies.sampler import Sampler, Settings
 from mixed_order_game.studies.sampling import Sampling
 from mixed_order_game.studies.sweep.conduct import connected_graphs_example, sweep
@@ -25,6 +24,7 @@ from mixed_order_game.studies.sweep.definition import Sweep
 from mixed_order_game.studies.sweep.figures import _image, check_heat_map, plot_edges, plot_heat_map
 from mixed_order_game.studies.sweep.store import SweepError
 from mixed_order_game.studies.sweep.table import SweepResult, load_sweep
+from mixed_order_game.studies.worker import PoolError
 from tests.python import sweep_workers
 
 SHORT = Settings(stop_time=0.2)

@@ -7,17 +7,19 @@ import subprocess
 import sys
 import time
 import weakref
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from concurrent.futures import Future
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from mixed_order_game.studies.pool import WORKER_DIED, Case, PoolError, Source, _loaded, run_chunk
+from mixed_order_game.studies.pool import WORKER_DIED, run_cases
 from mixed_order_game.studies.sampler import Settings
 from mixed_order_game.studies.sweep.conduct import sweep
 from mixed_order_game.studies.sweep.definition import Sweep
+from mixed_order_game.studies.worker import Case, Outcome, PoolError, Source, _loaded, run_chunk
 from mixed_order_game.version import package_version
 from tests.python import sweep_workers
 from tests.python.test_sweep import runs_of
@@ -57,6 +59,38 @@ def test_a_row_that_kills_its_workers_is_told(fmu: Path, tmp_path: Path, notes: 
 def test_a_machine_on_which_workers_die_is_told(fmu: Path, tmp_path: Path) -> None:
     with pytest.raises(PoolError, match="10 workers died in a row"):
         sweep(definition(fmu), tmp_path / "s", jobs=2, work=sweep_workers.dies)
+
+
+class Counted:
+    """A pool of two workers that have each chunk done at once, in 0.01 s a row."""
+
+    workers = 2
+
+    def __init__(self) -> None:
+        self.chunks: list[int] = []
+
+    def submit(self, _settings: Settings, cases: Sequence[Case]) -> "Future[list[Outcome]]":
+        self.chunks.append(len(cases))
+        done: Future[list[Outcome]] = Future()
+        done.set_result([Outcome(case.row, None, "ok", 0.01) for case in cases])
+        return done
+
+    def died(self, _error: BaseException) -> bool:
+        return False
+
+    def revive(self) -> bool:
+        return False
+
+    def close(self) -> None:
+        pass
+
+
+def test_chunks_take_a_tenth_of_a_second_and_less_in_the_end() -> None:
+    pool, cases = Counted(), [Case(row, {}) for row in range(200)]
+    outcomes = run_cases(pool, SHORT, iter(cases), len(cases))
+    assert sorted(each.row for chunk in outcomes for each in chunk) == list(range(200))
+    assert pool.chunks[:4] == [1, 1, 1, 1]  # as long as no run has told what it takes
+    assert pool.chunks[4:] == [*[10] * 16, 9, 6, 5, 4, 3, 2, *[1] * 7]
 
 
 def test_a_worker_keeps_one_fmu_only(fmu: Path) -> None:

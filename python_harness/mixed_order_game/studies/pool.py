@@ -5,10 +5,7 @@ is run again row by row; a row that kills a worker of its own is told as failed,
 stop a sweep.
 """
 
-import asyncio
-import atexit
 import contextlib
-import hashlib
 import multiprocessing
 import os
 import shutil
@@ -16,25 +13,23 @@ import signal
 import tempfile
 import threading
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from dataclasses import dataclass
+from itertools import islice
 from multiprocessing import connection
 from pathlib import Path
-from time import thread_time
-from typing import Any, Protocol
+from typing import Protocol
 
-from ..errors import MixedOrderGameError, ModelError, SimulationError
-from ..extras import need
-from ..fmu.model import Value
+from ..errors import ModelError
 from ..interrupts import blocked_interrupt
-from ..results.metrics import Metrics
-from ..version import package_version
-from .sampler import Sampler, Settings
+from .sampler import Settings
+from .worker import Case, Outcome, PoolError, Work, run_chunk, source_of
 
 LARGEST_CHUNK = 16
-CHUNKS_PER_WORKER = 16
+CHUNK_SECONDS = 0.1
+"""CPU time of a chunk's runs, as long as one of them takes no more."""
+
 QUEUED_PER_WORKER = 2
 READY_EVERY = 0.1
 """Time in s after which run_cases tells again that it is ready for a signal."""
@@ -43,80 +38,6 @@ DEATHS_IN_A_ROW = 10
 """Deaths of workers without one finished run in between that end a sweep: then the machine is to blame."""
 
 WORKER_DIED = "the worker process died during this run"
-
-
-class PoolError(MixedOrderGameError):
-    """Workers that cannot be reached, or that die whatever they run."""
-
-
-@dataclass(frozen=True)
-class Case:
-    """One run: its row in the table and the start values that differ from the FMU's."""
-
-    row: int
-    values: Mapping[str, Value]
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """What became of a case: its figures, or None and the reason; CPU time of its thread in s."""
-
-    row: int
-    metrics: Metrics | None
-    status: str  # ok, or the error in one sentence
-    cpu_seconds: float
-
-
-@dataclass(frozen=True)
-class Source:
-    """The FMU for a worker: a path on this machine, or its bytes for another one."""
-
-    key: str  # fingerprint of the bytes
-    package_version: str
-    path: Path | None = None
-    content: bytes | None = None
-
-
-Work = Callable[[Source, Settings, Sequence[Case]], list[Outcome]]
-
-_loaded = threading.local()
-
-
-def run_chunk(source: Source, settings: Settings, cases: Sequence[Case]) -> list[Outcome]:
-    """Run cases one after the other on this thread's instance of the FMU, loaded on first use."""
-    if source.package_version != package_version():
-        told = f"{package_version()} there, {source.package_version} here"
-        raise PoolError(f"a worker has another version of mixed-order-game: {told}")
-    sampler = _sampler(source)
-    outcomes = []
-    for case in cases:
-        begin = thread_time()
-        try:
-            found, status = sampler.measure(case.values, settings), "ok"
-        except SimulationError as error:
-            found, status = None, str(error)
-        outcomes.append(Outcome(case.row, found, status, thread_time() - begin))
-    return outcomes
-
-
-def _sampler(source: Source) -> Sampler:
-    held: tuple[str, Sampler] | None = getattr(_loaded, "sampler", None)
-    if held is not None and held[0] == source.key:
-        return held[1]
-    if held is not None:
-        held[1].close()
-        atexit.unregister(held[1].close)
-        _loaded.sampler = None
-    if source.path is not None:
-        sampler = Sampler(source.path)
-    else:
-        with tempfile.TemporaryDirectory(prefix="mixed-order-game-") as folder:
-            path = Path(folder) / "MixedOrderGame.fmu"
-            path.write_bytes(source.content or b"")
-            sampler = Sampler(path)
-    _loaded.sampler = (source.key, sampler)
-    atexit.register(sampler.close)
-    return sampler
 
 
 class Pool(Protocol):
@@ -145,7 +66,7 @@ class LocalPool:
     def __init__(self, fmu: Path, jobs: int, work: Work = run_chunk) -> None:
         self.workers = jobs
         self._work = work
-        self._source = Source(_fingerprint(fmu), package_version(), path=fmu.resolve())
+        self._source = source_of(fmu)
         self._folder = tempfile.TemporaryDirectory(prefix="mixed-order-game-")
         self._open()
 
@@ -197,75 +118,6 @@ def _end_with(reader: connection.Connection, folder: str) -> None:
     os._exit(1)
 
 
-class DaskPool:
-    """Workers of a Dask cluster; the FMU goes to them as bytes, so that they need not share a file system."""
-
-    def __init__(self, fmu: Path, scheduler: str, work: Work = run_chunk) -> None:
-        client: Any = need("distributed").Client
-        try:
-            self._client: Any = client(scheduler, timeout="10s", set_as_default=False)
-        except (OSError, ValueError) as error:
-            raise PoolError(f"there is no Dask scheduler at {scheduler}: {error}") from error
-        self._work = work
-        self._address = scheduler
-        content = fmu.read_bytes()
-        self._source = self._client.scatter(
-            Source(_fingerprint(fmu), package_version(), content=content), broadcast=bool(self._threads())
-        )
-
-    @property
-    def workers(self) -> int:
-        """Threads of the cluster at this moment, at least one."""
-        return max(1, self._threads())
-
-    def _threads(self) -> int:
-        try:
-            return sum(self._client.nthreads().values())
-        except (OSError, CancelledError, asyncio.CancelledError) as error:
-            raise self._gone() from error
-
-    def submit(self, settings: Settings, cases: Sequence[Case]) -> "Future[list[Outcome]]":
-        """Give a chunk to a worker; Dask runs it elsewhere if that worker dies, a few times."""
-        given: Future[list[Outcome]] = Future()
-
-        def hand_over(done: Any) -> None:
-            if not given.set_running_or_notify_cancel():
-                return
-            try:
-                given.set_result(done.result())
-            except asyncio.CancelledError:  # Dask's, when it lost its scheduler; not an Exception
-                given.set_exception(CancelledError())
-            except Exception as error:  # noqa: BLE001 - whatever it is, run_cases shall see it
-                given.set_exception(error)
-
-        try:
-            future = self._client.submit(self._work, self._source, settings, cases, pure=False)
-        except Exception as error:
-            raise self._gone() from error
-        given.add_done_callback(lambda it: future.cancel() if it.cancelled() else None)
-        future.add_done_callback(hand_over)
-        return given
-
-    def died(self, error: BaseException) -> bool:
-        """Whether several workers died of a chunk, or its outcomes were lost on their way."""
-        from distributed.scheduler import KilledWorker
-
-        return isinstance(error, KilledWorker | CancelledError | OSError)
-
-    def revive(self) -> bool:
-        """Dask's nannies start workers again; without a scheduler there is nothing to go on with."""
-        if self._client.status != "running":
-            raise self._gone()
-        return False
-
-    def _gone(self) -> PoolError:
-        return PoolError(f"the Dask scheduler at {self._address} is gone")
-
-    def close(self) -> None:
-        """Leave the cluster; it goes on without us."""
-        self._client.close()
-
-
 def open_pool(
     fmu: Path, *, jobs: int | None = None, scheduler: str | None = None, work: Work = run_chunk
 ) -> Pool:
@@ -276,6 +128,8 @@ def open_pool(
     if not fmu.is_file():
         raise ModelError(f"there is no FMU {fmu}")
     if scheduler is not None:
+        from .dask_pool import DaskPool
+
         return DaskPool(fmu, scheduler, work)
     if jobs is not None and jobs < 1:
         raise PoolError(f"jobs = {jobs} is not positive")
@@ -290,42 +144,45 @@ def usable_cores() -> int:
 def run_cases(
     pool: Pool,
     settings: Settings,
-    cases: Sequence[Case],
+    cases: Iterable[Case],
+    count: int,
     *,
-    chunk: int | None = None,
     ready: Callable[[], None] = lambda: None,
 ) -> Iterator[list[Outcome]]:
-    """Run cases and give their outcomes in chunks as they finish; every case has one outcome in the end.
+    """Run count cases and give their outcomes in chunks as they finish; every case has one in the end.
 
+    cases: taken as the workers get to them.
     ready: called several times a second where an exception that it raises loses nothing.
     Raises VariableError for values that the FMU does not take, PoolError if workers die whatever they run.
     """
-    size = chunk or max(1, min(LARGEST_CHUNK, len(cases) // (pool.workers * CHUNKS_PER_WORKER)))
-    chunks = [cases[k : k + size] for k in range(0, len(cases), size)]
-    return _Dispatch(pool, settings, chunks, ready).outcomes()
+    return _Dispatch(pool, settings, cases, count, ready).outcomes()
 
 
 class _Dispatch:
-    """Chunks that wait and chunks that run. What a dead worker lost waits again, one row a chunk."""
+    """Cases that wait and chunks that run. What a dead worker lost runs again, one row a chunk."""
 
     def __init__(
         self,
         pool: Pool,
         settings: Settings,
-        chunks: Iterable[Sequence[Case]],
+        cases: Iterable[Case],
+        count: int,
         ready: Callable[[], None],
     ) -> None:
         self._pool = pool
         self._settings = settings
         self._ready = ready
-        self._waiting = deque(chunks)
+        self._cases = iter(cases)
+        self._left = count  # of the cases
+        self._again: deque[Sequence[Case]] = deque()
         self._running: dict[Future[list[Outcome]], Sequence[Case]] = {}
         self._lost: list[Sequence[Case]] = []
         self._deaths = 0  # since the last finished run
+        self._seconds = CHUNK_SECONDS  # CPU time of a run, by the last chunk that has ended
 
     def outcomes(self) -> Iterator[list[Outcome]]:
         try:
-            while self._waiting or self._running:
+            while self._again or self._left or self._running:
                 self._fill()
                 if self._running and not self._lost:
                     yield from self._collect(self._wait_for(self._running))
@@ -345,14 +202,20 @@ class _Dispatch:
 
     def _fill(self) -> None:
         """Keep the workers busy, until the pool turns out to be broken."""
-        while (
-            self._waiting and not self._lost and len(self._running) < QUEUED_PER_WORKER * self._pool.workers
-        ):
-            chunk = self._waiting.popleft()
+        most = QUEUED_PER_WORKER * self._pool.workers
+        while (self._again or self._left) and not self._lost and len(self._running) < most:
+            chunk = self._again.popleft() if self._again else self._next(most)
             try:
                 self._running[self._pool.submit(self._settings, chunk)] = chunk
             except BrokenProcessPool:
                 self._lost.append(chunk)
+
+    def _next(self, queued: int) -> Sequence[Case]:
+        """As many cases as take CHUNK_SECONDS; in the end fewer, so that no worker waits long for another."""
+        by_time = CHUNK_SECONDS / max(self._seconds, CHUNK_SECONDS / LARGEST_CHUNK)
+        size = max(1, int(min(by_time, self._left / queued)))
+        self._left -= size
+        return list(islice(self._cases, size))
 
     def _collect(self, futures: Iterable["Future[list[Outcome]]"]) -> Iterator[list[Outcome]]:
         """Outcomes of futures that have ended."""
@@ -363,6 +226,7 @@ class _Dispatch:
                 self._lost.append(chunk)
             else:
                 self._deaths = 0
+                self._seconds = sum(outcome.cpu_seconds for outcome in outcomes) / len(outcomes)
                 yield outcomes
 
     def _recover(self) -> Iterator[list[Outcome]]:
@@ -372,7 +236,7 @@ class _Dispatch:
         lost, self._lost = self._lost, []
         for chunk in lost:
             if len(chunk) > 1:
-                self._waiting.extendleft([case] for case in chunk)
+                self._again.extend([case] for case in chunk)
                 continue
             outcome = self._alone(chunk[0])
             self._deaths = self._deaths + 1 if outcome.status == WORKER_DIED else 0
@@ -400,7 +264,3 @@ def _outcomes(pool: Pool, future: "Future[list[Outcome]]") -> list[Outcome] | No
         if pool.died(error):
             return None
         raise
-
-
-def _fingerprint(fmu: Path) -> str:
-    return hashlib.sha256(fmu.read_bytes()).hexdigest()

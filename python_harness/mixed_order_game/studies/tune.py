@@ -27,8 +27,9 @@ from ..results.metrics import METRIC_UNITS, SETTLED, Metrics
 from ..theory.linearized import gradient_jacobian, linearized_loop
 from ..theory.spectrum import initial_deviation, linear_loop, owners, spectral_abscissa
 from .designs import Range
-from .pool import Case, open_pool, run_cases
+from .pool import open_pool, run_cases
 from .sampler import Sampler, Settings
+from .worker import Case
 
 FloatArray = NDArray[np.float64]
 
@@ -643,7 +644,7 @@ class _Search:
         pool = open_pool(self.sampler.model.path, jobs=self.jobs)
         try:
             cases = [Case(k, each) for k, each in enumerate(values)]
-            for outcomes in run_cases(pool, self.settings, cases, ready=self.take_signals):
+            for outcomes in run_cases(pool, self.settings, cases, len(cases), ready=self.take_signals):
                 for outcome in outcomes:
                     found[outcome.row] = outcome.metrics
         finally:

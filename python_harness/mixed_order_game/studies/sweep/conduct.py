@@ -1,6 +1,7 @@
 """Carries a sweep out: opens the folder, runs what is not finished, writes rows as they come, joins them."""
 
 from collections.abc import Callable
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -11,8 +12,9 @@ from ...fmu.model import read_model
 from ...game.graphs import all_connected
 from ...interrupts import noted_signals
 from ..designs import DesignError
-from ..pool import Work, open_pool, run_cases, run_chunk
+from ..pool import open_pool, run_cases
 from ..sampler import Settings
+from ..worker import Work, run_chunk
 from .definition import Sweep
 from .store import Store, locked
 from .table import SweepResult, load_sweep
@@ -108,20 +110,24 @@ def _carried_out(
     with locked(output), noted_signals() as take_signals:
         store = Store(output, definition, restart=restart)
         finished = store.finished()
-        cases = [definition.case(row) for row in range(definition.rows) if row not in finished]
-        done = definition.rows - len(cases)
+        rows = [row for row in range(definition.rows) if row not in finished]
+        done = definition.rows - len(rows)
         if progress is not None:
             progress(done, definition.rows)
-        if cases:
+
+        def ready() -> None:
+            take_signals()
+            store.write_due()
+
+        if rows:
             pool = open_pool(definition.model.path, jobs=jobs, scheduler=scheduler, work=work)
-            try:
-                for outcomes in run_cases(pool, definition.settings, cases, ready=take_signals):
+            with closing(pool), closing(store):
+                cases = map(definition.case, rows)
+                for outcomes in run_cases(pool, definition.settings, cases, len(rows), ready=ready):
                     store.append(outcomes)
                     done += len(outcomes)
                     if progress is not None:
                         progress(done, definition.rows)
-            finally:
-                pool.close()
         store.join()
     return load_sweep(output)
 

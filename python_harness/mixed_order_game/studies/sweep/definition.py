@@ -19,9 +19,9 @@ from ...fmu.model import Model, Value, check_value, read_model
 from ...game.graphs import CommunicationGraph
 from ...version import package_version
 from ..designs import DesignError, Range, initial_states, sample
-from ..pool import Case
 from ..sampler import Settings
 from ..sampling import Sampling
+from ..worker import Case
 
 LARGEST_SWEEP = 10_000_000
 INITIAL_ACTIONS = Range(-10.0, 10.0)

@@ -10,6 +10,7 @@ import shutil
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from time import monotonic
 from typing import Any
 
 import numpy as np
@@ -19,13 +20,16 @@ import pyarrow.parquet as pq
 from ...errors import MixedOrderGameError, ResultError, reason
 from ...files.writing import is_partial, write_whole
 from ...results.metrics import METRIC_UNITS
-from ..pool import Outcome
+from ..worker import Outcome
 from .definition import Sweep
 
 DEFINITION = "sweep.json"
 RESULTS = "results.parquet"
 ROWS = "rows"
 LOCK = ".lock"
+WRITE_EVERY = 0.2
+"""Time in s between two files of rows: each takes some milliseconds of what runs them."""
+
 COUNTS = ("row", "graph_edges", "initial_state", "sample")
 METADATA_KEY = b"mixed_order_game_sweep"
 
@@ -41,6 +45,8 @@ class Store:
         self.folder = folder
         self._sweep = sweep
         self._next = 0
+        self._waiting: list[dict[str, Any]] = []
+        self._written = monotonic()
         self._schema = schema_of(sweep)
         definition = folder / DEFINITION
         for path in (*folder.glob("*"), *(folder / ROWS).glob("*")):
@@ -76,11 +82,24 @@ class Store:
         return set(np.concatenate(rows).tolist()) if rows else set()
 
     def append(self, outcomes: Sequence[Outcome]) -> None:
-        """Write rows as one file."""
-        rows = [self._row(outcome) for outcome in outcomes]
+        """Take rows; they are written together, WRITE_EVERY after the last ones."""
+        self._waiting += [self._row(outcome) for outcome in outcomes]
+        self.write_due()
+
+    def write_due(self) -> None:
+        """Write the rows that wait, if the last ones were written WRITE_EVERY ago."""
+        if self._waiting and monotonic() - self._written >= WRITE_EVERY:
+            self.close()
+
+    def close(self) -> None:
+        """Write the rows that wait, as one file."""
+        if not self._waiting:
+            return
         path = self.folder / ROWS / f"{self._next:08d}.parquet"
+        self._write(path, pa.Table.from_pylist(self._waiting, schema=self._schema))
         self._next += 1
-        self._write(path, pa.Table.from_pylist(rows, schema=self._schema))
+        self._waiting.clear()
+        self._written = monotonic()
 
     def join(self) -> None:
         """Join all rows into results.parquet, in their order."""
