@@ -42,6 +42,11 @@ def test_nothing_is_cut(
             assert words(each.metavar or "") <= words(text)
 
 
+def test_lists_of_commands_cut_no_sentence() -> None:
+    for name, command in ROOT.commands.items():
+        assert command.get_short_help_str() == command.help.partition("\n\n")[0], name
+
+
 def test_where_the_console_has_few_characters() -> None:
     environment = os.environ | {"COLUMNS": "80", "LC_ALL": "C", "PYTHONIOENCODING": "latin-1"}
     command = [sys.executable, "-m", "mixed_order_game", "run", "--help"]

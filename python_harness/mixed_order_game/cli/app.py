@@ -91,7 +91,8 @@ COMMANDS = {
 }
 for heading, commands in COMMANDS.items():
     for command in commands:
-        app.command(cls=Command, help=help_of(command), rich_help_panel=heading)(
+        told = help_of(command)
+        app.command(cls=Command, help=told, short_help=told.partition("\n\n")[0], rich_help_panel=heading)(
             with_verbosity(grouped(command))
         )
 
