@@ -137,6 +137,7 @@ class AffineGradients final : public GradientsOnly {
   std::vector<Real> linear;
 
   [[nodiscard]] std::unique_ptr<Cost> clone() const override { return std::make_unique<AffineGradients>(*this); }
+  using GradientsOnly::own_gradients;
   void own_gradients(const Real* points, int stride, Real* gradient, const Real* /*held*/ = nullptr) const override {
     for (int i = 0; i < players_; ++i) {
       gradient[i] = linear[at(i)];
@@ -191,6 +192,7 @@ class RunawayCost final : public GradientsOnly {
  public:
   RunawayCost() : GradientsOnly(2) {}
   [[nodiscard]] std::unique_ptr<Cost> clone() const override { return std::make_unique<RunawayCost>(*this); }
+  using GradientsOnly::own_gradients;
   void own_gradients(const Real* points, int stride, Real* gradient, const Real* /*held*/ = nullptr) const override {
     gradient[0] = std::exp(points[0]);
     gradient[1] = points[stride + 1];
@@ -233,6 +235,7 @@ class ExponentialCost final : public GradientsOnly {
  public:
   ExponentialCost() : GradientsOnly(2) {}
   [[nodiscard]] std::unique_ptr<Cost> clone() const override { return std::make_unique<ExponentialCost>(*this); }
+  using GradientsOnly::own_gradients;
   void own_gradients(const Real* points, int stride, Real* gradient, const Real* /*held*/ = nullptr) const override {
     gradient[0] = std::exp(points[0] - 1.0) - 1.0 + points[1];
     gradient[1] = std::sinh(points[stride + 1]) - points[stride];
@@ -254,6 +257,7 @@ class CyclingCost final : public GradientsOnly {
  public:
   CyclingCost() : GradientsOnly(2) {}
   [[nodiscard]] std::unique_ptr<Cost> clone() const override { return std::make_unique<CyclingCost>(*this); }
+  using GradientsOnly::own_gradients;
   void own_gradients(const Real* points, int stride, Real* gradient, const Real* /*held*/ = nullptr) const override {
     gradient[0] = points[0] * points[0] * points[0] - 2.0 * points[0] + 2.0;
     gradient[1] = points[stride + 1];

@@ -285,7 +285,9 @@ const std::vector<Size> loop_sizes{{2, 1, 1}, {3, 2, 5}, {5, 2, 11}, {4, 3, 7}, 
 
 TEST(Activations, AreGaussians) {
   RandomNumbers random(7);
-  for (const auto& [players, dimension, neurons] : loop_sizes) {
+  for (const Size& size : loop_sizes) {
+    // no structured binding: Clang lets lambdas have none
+    const int players = size.players, dimension = size.dimension, neurons = size.neurons;
     const int n = players * dimension;
     const Array y(players * n, random);
     const Array numbers(neurons * players, random);
@@ -369,7 +371,8 @@ struct Ring {
 
 TEST(EstimateRates, AreTheConsensusLaw) {
   RandomNumbers random(8);
-  for (const auto& [players, dimension, neurons] : loop_sizes) {
+  for (const Size& size : loop_sizes) {
+    const int players = size.players, dimension = size.dimension;
     const int n = players * dimension;
     const Ring ring(players, random);
     const Array y(players * n, random);
@@ -436,7 +439,8 @@ TEST(Columns, FollowTheirFormulas) {
 
 TEST(SharedSignal, IsAddedToTheEstimateOfItsPlayer) {
   RandomNumbers random(10);
-  for (const auto& [players, dimension, neurons] : loop_sizes) {
+  for (const Size& size : loop_sizes) {
+    const int players = size.players, dimension = size.dimension;
     const int n = players * dimension;
     const Array gain(players * players, random), shared(n, random), y(players * n, random);
     const Array computed = on_every_level([&](const Kernels& kernel) {
@@ -544,7 +548,8 @@ TEST(Blocks, AreFactoredAndSolvedSideBySide) {
 
 TEST(Blocks, AreSolvedByTheirModes) {
   RandomNumbers random(16);
-  for (const auto& [N, dimension, neurons] : loop_sizes) {
+  for (const Size& size : loop_sizes) {
+    const int N = size.players, dimension = size.dimension;
     if (N > most_players_by_eigenvectors) continue;
     const int n = N * dimension;
     const Array vector(N * N * n, random), eigenvalue(N * n, random, 0.0, 9.0), shared(N * n, random),
