@@ -55,17 +55,20 @@ std::string constants(std::string_view toml, std::string_view request) {
   const Model model(toml);
   const toml::table document = parse_toml(request);
   const TomlEntry asked(document);
-  asked.accept_keys({"box", "settings"});
+  asked.accept_keys({"box", "speed", "settings"});
   const Shape& shape = model.game.parameters.shape;
   if (!shape.hosts_all()) throw GameError("some players are elsewhere, expected a game with all of its players");
   const Parameters parameters = settings_with(asked["settings"], model).parameters;
   GameExpressions expressions;
   parse_game(toml, expressions);
-  const BoxConstants found = box_constants(parameters, expressions, box_of(asked["box"], shape));
+  const Real speed = asked["speed"].number();
+  if (!(speed >= 0.0)) asked["speed"].fail("a speed of at least 0");
+  const BoxConstants found = box_constants(parameters, expressions, box_of(asked["box"], shape), speed);
   std::vector<Real> gradient(at(shape.actions()));
   parameters.cost->own_gradients(parameters.initial.y.data(), shape.actions(), gradient.data());
   return "{\"monotonicity\": " + bound(found.monotonicity) + ",\n \"gradients\": " + jacobian(found.gradients, shape) +
          ",\n \"dynamics\": " + jacobian(found.dynamics, shape) +
+         ",\n \"velocities\": " + jacobian(found.velocities, shape) +
          ",\n \"dynamics_size\": " + json_actions(found.dynamics_size, shape) +
          ",\n \"disturbance_size\": " + json_actions(found.disturbance_size, shape) +
          ",\n \"first_gradients\": " + json_actions(gradient, shape) +

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -55,14 +55,18 @@ def cournot_isoelastic() -> Functions:
     return Functions(costs, dynamics, disturbances)
 
 
-def electric_vehicles() -> Functions:
-    base, wanted = np.array([14.0, 8.0, 11.0]), np.array([9.0, 6.0, 12.0, 7.5, 10.5, 6.0])
+def electric_vehicles(
+    wanted: Sequence[float] = (9.0, 6.0, 12.0, 7.5, 10.5, 6.0),
+    base: Sequence[float] = (14.0, 8.0, 11.0),
+    capacity: float = 40.0,
+) -> Functions:
+    energy, load = np.array(wanted), np.array(base)
 
     def costs(x: Numbers) -> Numbers:
         charge = own(x)
-        price = 15.0 * ((base + x.sum(axis=-2)) / 40.0) ** 1.5
-        even = np.sum((charge - wanted[:, np.newaxis] / 3.0) ** 2, axis=-1)
-        short = (charge.sum(axis=-1) - wanted) ** 2
+        price = 15.0 * ((load + x.sum(axis=-2)) / capacity) ** 1.5
+        even = np.sum((charge - energy[:, np.newaxis] / 3.0) ** 2, axis=-1)
+        short = (charge.sum(axis=-1) - energy) ** 2
         return np.asarray(np.sum(price * charge, axis=-1) + 0.2 * even + short)
 
     def dynamics(x: Numbers, v: Numbers) -> Numbers:
@@ -71,7 +75,7 @@ def electric_vehicles() -> Functions:
         return g
 
     def disturbances(t: float) -> Numbers:
-        i, hour = np.arange(1, 7)[:, np.newaxis], np.arange(1, 4)
+        i, hour = np.arange(1, len(energy) + 1)[:, np.newaxis], np.arange(1, 4)
         return 1.5 * np.sin((0.5 + 0.2 * i) * t + hour)
 
     return Functions(costs, dynamics, disturbances)
@@ -163,14 +167,17 @@ def energy_peak_price() -> Functions:
     return Functions(costs, dynamics, disturbances)
 
 
-def source_seeking() -> Functions:
-    s = np.array([(0.0, 2.0), (1.9, 0.6), (1.2, -1.6), (-1.2, -1.6), (-1.9, 0.6)])
-    players = np.arange(5)
+def source_seeking(
+    sources: Sequence[Sequence[float]] = ((0.0, 2.0), (1.9, 0.6), (1.2, -1.6), (-1.2, -1.6), (-1.9, 0.6)),
+) -> Functions:
+    s = np.array(sources)
+    N = len(s)
+    players = np.arange(N)
 
     def costs(x: Numbers) -> Numbers:
         here = own(x)
         field = 8.0 * np.exp(-np.sum((here - s) ** 2, axis=-1) / (2.0 * 2.5**2))
-        before, behind = x[..., players, (players + 1) % 5, :], x[..., players, (players - 1) % 5, :]
+        before, behind = x[..., players, (players + 1) % N, :], x[..., players, (players - 1) % N, :]
         distances = np.sum((here - before) ** 2 + (here - behind) ** 2, axis=-1)
         return np.asarray(0.12 * distances - field)
 
@@ -180,7 +187,7 @@ def source_seeking() -> Functions:
         return np.asarray(turning + 0.1 * np.roll(x, -1, axis=0))
 
     def disturbances(t: float) -> Numbers:
-        i = np.arange(1, 6)[:, np.newaxis]
+        i = np.arange(1, N + 1)[:, np.newaxis]
         return np.cos((0.7 + 0.2 * i) * t + 1.5 * np.array([1, 2]))
 
     return Functions(costs, dynamics, disturbances)
@@ -209,8 +216,15 @@ def rivalling_pairs() -> Functions:
     return Functions(costs, dynamics, disturbances)
 
 
-def underwater_vehicles() -> Functions:
-    p = np.array([(2.0, 1.0, -1.0), (-2.0, 1.5, -2.0), (-1.0, -2.0, -3.0), (1.5, -1.5, 0.0)])
+def underwater_vehicles(
+    places: Sequence[Sequence[float]] = (
+        (2.0, 1.0, -1.0),
+        (-2.0, 1.5, -2.0),
+        (-1.0, -2.0, -3.0),
+        (1.5, -1.5, 0.0),
+    ),
+) -> Functions:
+    p = np.array(places)
 
     def costs(x: Numbers) -> Numbers:
         here, middle = own(x), x.mean(axis=-2)
@@ -229,7 +243,7 @@ def underwater_vehicles() -> Functions:
         return np.asarray(g)
 
     def disturbances(t: float) -> Numbers:
-        i, coordinate = np.arange(1, 5)[:, np.newaxis], np.arange(1, 4)
+        i, coordinate = np.arange(1, len(p) + 1)[:, np.newaxis], np.arange(1, 4)
         return np.asarray((1.0 + 0.2 * i) * np.sin((0.5 + 0.2 * coordinate) * t + i))
 
     return Functions(costs, dynamics, disturbances)

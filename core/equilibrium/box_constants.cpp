@@ -23,8 +23,8 @@ using Box = std::vector<Interval>;
 using Matrix = Eigen::MatrixXd;
 
 constexpr Real infinite = std::numeric_limits<Real>::infinity();
-constexpr int most_cut_actions = 40;  // of games whose boxes are cut
-constexpr int most_parts = 20000;     // times actions
+constexpr int most_cut_sides = 40;  // that a quantity depends on, for the box to be cut
+constexpr int most_parts = 20000;   // times sides
 constexpr int most_corners = 200;
 constexpr int most_points = 200;
 constexpr Real close = 0.005;  // of proof and sample, relative, from where on no more is cut
@@ -45,22 +45,23 @@ struct Part {
 };
 
 /// Covers a box by parts on which an upper bound of a quantity is close to the largest sample, as far as the work
-/// allows: the part with the largest bound is cut along the action that moves it most.
-std::vector<Part> parts_of(const Box& whole, const std::function<Real(const Box&)>& bound, Real sampled) {
+/// allows: the part with the largest bound is cut along the side that moves it most, of those that it depends on.
+std::vector<Part> parts_of(const Box& whole, const std::function<Real(const Box&)>& bound, Real sampled,
+                           const std::vector<int>& sides) {
   const auto is_less = [](const Part& a, const Part& b) { return a.bound < b.bound; };
   std::vector<Part> parts{{whole, bound(whole)}};
   std::vector<Real> influence(whole.size(), 0.0);
-  if (whole.size() <= at(most_cut_actions)) {
-    for (std::size_t p = 0; p < whole.size(); ++p) {
-      if (whole[p].is_point()) continue;
+  if (sides.size() <= at(most_cut_sides)) {
+    for (const int p : sides) {
+      if (whole[at(p)].is_point()) continue;
       Box fixed = whole;
-      fixed[p] = Interval::of(middle_of(whole[p]));
+      fixed[at(p)] = Interval::of(middle_of(whole[at(p)]));
       const Real drop = parts[0].bound - bound(fixed);
-      influence[p] = std::isfinite(drop) ? std::max(drop, 0.0) : std::isnan(drop) ? 0.0 : 1e300;
+      influence[at(p)] = std::isfinite(drop) ? std::max(drop, 0.0) : std::isnan(drop) ? 0.0 : 1e300;
     }
     const Real largest = *std::max_element(influence.begin(), influence.end());
-    for (std::size_t p = 0; p < whole.size(); ++p) {
-      if (!whole[p].is_point()) influence[p] = std::max({influence[p], 1e-3 * largest, 1e-300});
+    for (const int p : sides) {
+      if (!whole[at(p)].is_point()) influence[at(p)] = std::max({influence[at(p)], 1e-3 * largest, 1e-300});
     }
   }
   const int most = std::max(300, most_parts / static_cast<int>(whole.size()));
@@ -118,10 +119,12 @@ Real norm_bound(const std::vector<Interval>& rows, int D) {
   return least * (1.0 + 10.0 * rounding);
 }
 
-/// Lower bound of the eigenvalues of the symmetric parts of all matrices of intervals: that of the one in the middle,
-/// less the norm of what the others differ by. The norm of a matrix R without negative entries is at most that of max_k
-/// (R v)_k / v_k with any positive v.
+/// Lower bound of the eigenvalues of the symmetric parts of all matrices of intervals. Such a matrix is at least the
+/// one in the middle, less on the diagonal its own radius and (R v)_k / v_k, R the radii beside the diagonal and v any
+/// positive vector: |2 r x_k x_p| <= r (v_p / v_k x_k^2 + v_k / v_p x_p^2). The first v balances all radii, which is as
+/// good as the norm of R; the next ones come closer to the sizes in the least eigenvector, where nothing is lost.
 Real least_eigenvalue(const std::vector<Interval>& entries, Eigen::Index n) {
+  constexpr int most_vectors = 6;
   Matrix middle(n, n);
   Matrix radius(n, n);
   for (Eigen::Index p = 0; p < n; ++p) {
@@ -133,17 +136,27 @@ Real least_eigenvalue(const std::vector<Interval>& entries, Eigen::Index n) {
     }
   }
   if (!middle.allFinite() || !radius.allFinite()) return -infinite;
+  const bool is_exact = radius.maxCoeff() == 0.0;
   Eigen::VectorXd v = Eigen::VectorXd::Ones(n);
-  Real norm = radius.maxCoeff() == 0.0 ? 0.0 : infinite;
-  for (int sweep = 0; sweep < 20 && norm > 0.0; ++sweep) {
+  for (int sweep = 0; sweep < 20 && !is_exact; ++sweep) {
     const Eigen::VectorXd next = radius * v;
-    norm = std::min(norm, next.cwiseQuotient(v).maxCoeff());
     v = next + Eigen::VectorXd::Constant(n, 1e-3 * next.maxCoeff());
     v /= v.maxCoeff();
   }
-  const Eigen::SelfAdjointEigenSolver<Matrix> solver(middle, Eigen::EigenvaluesOnly);
   const Real scale = middle.cwiseAbs().rowwise().sum().maxCoeff();
-  return solver.eigenvalues()(0) - norm * (1.0 + rounding) - rounding * static_cast<Real>(n) * scale;
+  Real least = -infinite;
+  for (int count = 0; count < (is_exact ? 1 : most_vectors); ++count) {
+    const Eigen::VectorXd less = (radius * v).cwiseQuotient(v) * (1.0 + static_cast<Real>(n) * rounding);
+    Matrix lower = middle;
+    lower.diagonal() -= less;
+    const Eigen::SelfAdjointEigenSolver<Matrix> solver(lower);
+    const Real here = solver.eigenvalues()(0) - rounding * static_cast<Real>(n) * (scale + less.maxCoeff());
+    if (count > 0 && here <= least + 1e-3 * std::abs(least)) return std::max(least, here);
+    least = here;
+    v = 0.5 * v / v.maxCoeff() +
+        0.5 * solver.eigenvectors().col(0).cwiseAbs() / solver.eigenvectors().col(0).cwiseAbs().maxCoeff();
+  }
+  return least;
 }
 
 Real norm_of(const Matrix& rows) {
@@ -154,7 +167,7 @@ Real norm_of(const Matrix& rows) {
 
 /// Corners and points inside, always the same ones.
 std::vector<std::vector<Real>> samples_of(const Box& box) {
-  const bool is_large = box.size() > at(most_cut_actions);
+  const bool is_large = box.size() > at(most_cut_sides);
   std::mt19937_64 random(1);  // NOLINT(bugprone-random-generator-seed): the same points in every run
   const auto share = [&] { return std::ldexp(static_cast<Real>(random() >> 11U), -53); };
   std::vector<std::vector<Real>> points(1);
@@ -187,71 +200,142 @@ Matrix full(const SparseRows& pattern, const std::vector<Real>& values, const Sh
   return matrix;
 }
 
-using RowsOverBox = std::function<Enclosure::Found(int i, const Box& box, std::vector<Interval>& rows)>;
+/// Those of player i.
+Matrix rows_of(const Matrix& matrix, int i, const Shape& shape) {
+  Matrix rows(shape.dimension, matrix.cols());
+  for (int l = 0; l < shape.dimension; ++l) rows.row(l) = matrix.row(shape.entry(i, l));
+  return rows;
+}
 
-/// sampled[i] are the largest norms of samples.
+/// How to enclose a player's rows over a box, and the sides of the box that they depend on.
+struct RowsOverBox {
+  std::function<Enclosure::Found(int i, const Box& box, std::vector<Interval>& rows)> enclose;
+  std::function<std::vector<int>(int i)> sides;
+};
+
+/// Narrows entries of D rows over the box by cutting it for each row alone, along what that row depends on.
+void narrow_by_rows(int D, const Box& box, const std::function<bool(const Box&, std::vector<Interval>&)>& proved_rows,
+                    const std::vector<int>& sides, std::vector<Interval>& narrowed) {
+  const std::size_t n = narrowed.size() / at(D);
+  std::vector<Interval> rows;
+  for (int l = 0; l < D; ++l) {
+    const auto row_of = [&] { return std::vector<Interval>(&rows[at(l) * n], &rows[at(l) * n] + n); };
+    const auto bound = [&](const Box& part) { return proved_rows(part, rows) ? norm_bound(row_of(), 1) : infinite; };
+    Real sampled = 0.0;
+    for (const std::vector<Real>& point : samples_of(box)) {
+      Box there;
+      for (const Real action : point) there.push_back(Interval::of(action));
+      if (proved_rows(there, rows)) sampled = std::max(sampled, norm_bound(row_of(), 1));
+    }
+    std::vector<Interval> hull(n, Interval::none());
+    for (const Part& part : parts_of(box, bound, sampled, sides)) {
+      if (!proved_rows(part.box, rows)) return;
+      for (std::size_t k = 0; k < n; ++k) {
+        const Interval& there = rows[at(l) * n + k];
+        hull[k] = {std::min(hull[k].lower, there.lower), std::max(hull[k].upper, there.upper)};
+      }
+    }
+    for (std::size_t k = 0; k < n; ++k) {
+      Interval& entry = narrowed[at(l) * n + k];
+      entry = {std::max(entry.lower, hull[k].lower), std::min(entry.upper, hull[k].upper)};
+    }
+  }
+}
+
+/// sampled[i] are the largest norms of samples. The box has a side for each action, and more when rows depend on more.
 JacobianBounds jacobian_bounds(const Shape& shape, const Box& box, const std::vector<Real>& sampled,
                                const RowsOverBox& rows_over) {
   const int D = shape.dimension;
-  const std::size_t n = box.size();
+  const std::size_t n = at(shape.actions());
   JacobianBounds bounds;
   bounds.entries.assign(n * n, Interval::none());
   std::vector<Interval> rows;
   for (int i = 0; i < shape.players; ++i) {
-    const auto bound = [&](const Box& part) {
-      return is_proof(rows_over(i, part, rows)) ? norm_bound(rows, D) : infinite;
+    const auto proved_rows = [&](const Box& part, std::vector<Interval>& found) {
+      return is_proof(rows_over.enclose(i, part, found));
     };
+    const std::vector<int> sides = rows_over.sides(i);
+    const auto bound = [&](const Box& part) { return proved_rows(part, rows) ? norm_bound(rows, D) : infinite; };
     Real proved = 0.0;
-    for (const Part& part : parts_of(box, bound, sampled[at(i)])) {
-      const bool is_proved = is_proof(rows_over(i, part.box, rows));
+    std::vector<Interval> hull(at(D) * n, Interval::none());
+    for (const Part& part : parts_of(box, bound, sampled[at(i)], sides)) {
+      const bool is_proved = proved_rows(part.box, rows);
       proved = std::max(proved, part.bound);
-      for (int l = 0; l < D; ++l) {
-        for (std::size_t k = 0; k < n; ++k) {
-          Interval& entry = bounds.entries[at(shape.entry(i, l)) * n + k];
-          const Interval& there = rows[at(l) * n + k];
-          if (!is_proved || !std::isfinite(proved)) {
-            entry = {};
-          } else {
-            entry = {std::min(entry.lower, there.lower), std::max(entry.upper, there.upper)};
-          }
+      for (std::size_t k = 0; k < hull.size(); ++k) {
+        if (!is_proved || !std::isfinite(proved)) {
+          hull[k] = {};
+        } else {
+          hull[k] = {std::min(hull[k].lower, rows[k].lower), std::max(hull[k].upper, rows[k].upper)};
         }
       }
+    }
+    if (D > 1 && std::isfinite(proved) && proved > (1.0 + close) * sampled[at(i)]) {
+      narrow_by_rows(D, box, proved_rows, sides, hull);
+      proved = std::min(proved, norm_bound(hull, D));
+    }
+    for (int l = 0; l < D; ++l) {
+      std::copy_n(hull.begin() + static_cast<std::ptrdiff_t>(at(l) * n), n,
+                  bounds.entries.begin() + static_cast<std::ptrdiff_t>(at(shape.entry(i, l)) * n));
     }
     bounds.lipschitz.push_back({proved, sampled[at(i)]});
   }
   return bounds;
 }
 
-/// Encloses g_i and its derivatives along actions.
+/// Encloses g_i and its derivatives along actions and velocities.
 class DynamicsRows {
  public:
   DynamicsRows(const Parameters& parameters, const std::vector<ExpressionCost::Text>& texts) : parameters_(parameters) {
     const Shape& shape = parameters.shape;
     for (int i = 0; i < shape.players; ++i) {
       const auto& graph = texts[at(shape.own_entry(i, 0))].graph;
-      players_.push_back(graph == nullptr ? nullptr : std::make_unique<OfPlayer>(OfPlayer{*graph, {}, {}, false}));
+      players_.push_back(graph == nullptr ? nullptr : std::make_unique<OfPlayer>(OfPlayer{*graph, {}, {}}));
       if (graph == nullptr) continue;
       OfPlayer& player = *players_.back();
-      std::vector<int> nodes;
-      for (int l = 0; l < shape.dimension; ++l) nodes.push_back(texts[at(shape.own_entry(i, l))].node);
+      std::vector<int> along_actions;
+      for (int l = 0; l < shape.dimension; ++l) along_actions.push_back(texts[at(shape.own_entry(i, l))].node);
+      std::vector<int> along_velocities = along_actions;
       for (int l = 0; l < shape.dimension; ++l) {
-        for (const auto& [leaf, derivative] : player.graph.derivatives(nodes[at(l)])) {
-          player.uses_velocities = player.uses_velocities || leaf.kind == LeafKind::velocity;
-          if (leaf.kind != LeafKind::action) continue;
-          nodes.push_back(derivative);
-          player.place.emplace_back(l, leaf.index);
+        for (const auto& [leaf, derivative] : player.graph.derivatives(along_actions[at(l)])) {
+          if (leaf.kind == LeafKind::action) {
+            along_actions.push_back(derivative);
+            player.actions.place.emplace_back(l, leaf.index);
+          } else if (leaf.kind == LeafKind::velocity) {
+            along_velocities.push_back(derivative);
+            player.velocities.place.emplace_back(l, leaf.index);
+          }
         }
       }
-      player.enclosure.emplace(player.graph, nodes);
+      player.actions.enclosure.emplace(player.graph, along_actions);
+      player.velocities.enclosure.emplace(player.graph, along_velocities);
     }
   }
 
   [[nodiscard]] bool uses_velocities(int i) const {
-    return players_[at(i)] != nullptr && players_[at(i)]->uses_velocities;
+    return players_[at(i)] != nullptr && !players_[at(i)]->velocities.place.empty();
   }
 
-  /// g_il at values[l], d g_il / d x_k at rows[l n + k].
-  Enclosure::Found operator()(int i, const Box& box, std::vector<Interval>& rows, std::vector<Interval>& values) const {
+  /// Sides of the boxes below that the rows depend on.
+  [[nodiscard]] std::vector<int> sides_along_actions(int i) const {
+    const Shape& shape = parameters_.shape;
+    std::vector<int> sides =
+        players_[at(i)] == nullptr ? std::vector<int>{} : sides_of(players_[at(i)]->actions, false);
+    for (const auto& [number, coefficient] : parameters_.dynamics->coefficients.terms(PolynomialDynamics::square)) {
+      const int entry = number / shape.players;
+      if (shape.player_of(entry) != i || coefficient == 0.0) continue;
+      sides.push_back(shape.entry(number % shape.players, shape.coordinate_of(entry)));
+    }
+    std::sort(sides.begin(), sides.end());
+    sides.erase(std::unique(sides.begin(), sides.end()), sides.end());
+    return sides;
+  }
+  [[nodiscard]] std::vector<int> sides_along_velocities(int i) const {
+    return uses_velocities(i) ? sides_of(players_[at(i)]->velocities, true) : std::vector<int>{};
+  }
+
+  /// While all are at rest: g_il at values[l], d g_il / d x_k at rows[l n + k]. The box has n sides.
+  Enclosure::Found along_actions(int i, const Box& box, std::vector<Interval>& rows,
+                                 std::vector<Interval>& values) const {
     const Shape& shape = parameters_.shape;
     const Coefficients& coefficients = parameters_.dynamics->coefficients;
     const std::size_t n = box.size();
@@ -259,13 +343,7 @@ class DynamicsRows {
     values.assign(at(shape.dimension), Interval::of(0.0));
     Enclosure::Found found;
     if (const OfPlayer* player = players_[at(i)].get(); player != nullptr) {
-      std::vector<Interval> of_nodes;
-      found = player->enclosure->evaluate(box, coefficients.named, of_nodes);
-      std::copy_n(of_nodes.begin(), shape.dimension, values.begin());
-      for (std::size_t k = 0; k < player->place.size(); ++k) {
-        const auto [l, column] = player->place[k];
-        rows[at(l) * n + at(column)] = of_nodes[at(shape.dimension) + k];
-      }
+      found = fill(player->actions, box, rows, values);
     }
     const auto add_terms = [&](int number, const auto& value, const auto& slope) {
       for (int l = 0; l < shape.dimension; ++l) {
@@ -291,13 +369,68 @@ class DynamicsRows {
     return found;
   }
 
+  /// d g_il / d v_k at rows[l n + k]. The box has 2 n sides, those of the actions, then those of the velocities.
+  Enclosure::Found along_velocities(int i, const Box& box, std::vector<Interval>& rows) const {
+    const Shape& shape = parameters_.shape;
+    rows.assign(at(shape.dimension) * at(shape.actions()), Interval::of(0.0));
+    if (!uses_velocities(i)) return {};
+    std::vector<Interval> values(at(shape.dimension));
+    const Enclosure::Found found = fill(players_[at(i)]->velocities, box, rows, values);
+    const Interval gain = Interval::of(parameters_.dynamics->coefficients[PolynomialDynamics::gain][at(i)]);
+    for (Interval& each : rows) each = gain * each;
+    return found;
+  }
+
  private:
+  /// Some derivatives of g_i, after its values.
+  struct Derivatives {
+    std::optional<Enclosure> enclosure;
+    std::vector<std::pair<int, int>> place;  // l and column
+  };
   struct OfPlayer {
     ExpressionGraph graph;
-    std::optional<Enclosure> enclosure;
-    std::vector<std::pair<int, int>> place;  // l and column of the derivatives, which come after the values
-    bool uses_velocities;
+    Derivatives actions;
+    Derivatives velocities;
   };
+
+  [[nodiscard]] std::vector<int> sides_of(const Derivatives& derivatives, bool with_velocities) const {
+    std::vector<int> sides;
+    for (const Leaf& leaf : derivatives.enclosure->leaves()) {
+      if (leaf.kind == LeafKind::action) sides.push_back(leaf.index);
+      if (leaf.kind == LeafKind::velocity && with_velocities) {
+        sides.push_back(parameters_.shape.actions() + leaf.index);
+      }
+    }
+    return sides;
+  }
+
+  /// Velocities that the box has no sides for are 0.
+  Enclosure::Found fill(const Derivatives& derivatives, const Box& box, std::vector<Interval>& rows,
+                        std::vector<Interval>& values) const {
+    const std::size_t n = at(parameters_.shape.actions());
+    std::vector<Interval> of_nodes;
+    const Enclosure::Found found = derivatives.enclosure->evaluate(
+        [&](const Leaf& leaf) {
+          switch (leaf.kind) {
+            case LeafKind::action:
+              return box[at(leaf.index)];
+            case LeafKind::velocity:
+              return box.size() > n ? box[n + at(leaf.index)] : Interval::of(0.0);
+            case LeafKind::parameter:
+              return Interval::of(parameters_.dynamics->coefficients.named[at(leaf.index)]);
+            default:
+              return Interval{};
+          }
+        },
+        of_nodes);
+    std::copy_n(of_nodes.begin(), values.size(), values.begin());
+    for (std::size_t k = 0; k < derivatives.place.size(); ++k) {
+      const auto [l, column] = derivatives.place[k];
+      rows[at(l) * n + at(column)] = of_nodes[values.size() + k];
+    }
+    return found;
+  }
+
   const Parameters& parameters_;
   std::vector<std::unique_ptr<OfPlayer>> players_;  // null without an expression
 };
@@ -329,9 +462,88 @@ std::string why_not(const char* what, int i, const Enclosure::Found& found) {
   return of_player + " may have derivatives without a bound in the box";
 }
 
+/// A side for each action, then one for each velocity, which players of order 1 have none of.
+Box with_speeds(const Box& box, const Shape& shape, Real speed) {
+  Box both = box;
+  for (int k = 0; k < shape.actions(); ++k) {
+    both.push_back(shape.is_second_order(shape.player_of(k)) ? Interval{-speed, speed} : Interval::of(0.0));
+  }
+  return both;
+}
+
+/// Of g_i along velocities.
+JacobianBounds velocity_bounds(const Parameters& parameters, const DynamicsRows& dynamics, const Box& box, Real speed) {
+  const Shape& shape = parameters.shape;
+  const Box both = with_speeds(box, shape, speed);
+  std::vector<Real> sampled(at(shape.players), 0.0);
+  const SparseRows& pattern = parameters.dynamics->velocity_pattern();
+  std::vector<Real> entries(at(pattern.entries()));
+  if (!entries.empty()) {
+    for (const std::vector<Real>& point : samples_of(both)) {
+      parameters.dynamics->velocity_jacobian(point.data(), point.data() + shape.actions(), entries.data());
+      const Matrix change = full(pattern, entries, shape);
+      for (int i = 0; i < shape.players; ++i) {
+        const Matrix rows = rows_of(change, i, shape);
+        if (rows.allFinite()) sampled[at(i)] = std::max(sampled[at(i)], norm_of(rows));
+      }
+    }
+  }
+  return jacobian_bounds(
+      shape, both, sampled,
+      {[&](int i, const Box& part, std::vector<Interval>& rows) { return dynamics.along_velocities(i, part, rows); },
+       [&](int i) { return dynamics.sides_along_velocities(i); }});
+}
+
+/// Lower bound of the eigenvalues of the symmetric part of dP/dx: the block of each player's own actions is at least
+/// the one in the middle of its entries, less what the box cut along the actions that the block depends on asks for;
+/// the entries beside the blocks are anything within theirs.
+Real least_by_blocks(const Shape& shape, const HessianBounds& hessian, const Box& box, std::vector<Interval> entries) {
+  const int D = shape.dimension;
+  const std::size_t n = box.size();
+  std::vector<Interval> rows;
+  std::vector<Interval> block(at(D) * at(D));
+  for (int i = 0; i < shape.players; ++i) {
+    const auto place = [&](int l, int h) { return at(shape.entry(i, l)) * n + at(shape.entry(i, h)); };
+    std::vector<Real> middle;
+    for (int l = 0; l < D; ++l) {
+      for (int h = 0; h < D; ++h) middle.push_back(middle_of(entries[place(l, h)]));
+    }
+    const auto lacking = [&](const Box& part) {
+      if (!is_proof(hessian.own_rows(i, part, rows))) return infinite;
+      for (int l = 0; l < D; ++l) {
+        for (int h = 0; h < D; ++h) {
+          const std::size_t k = at(l * D + h);
+          block[k] = rows[at(l) * n + at(shape.entry(i, h))] - Interval::of(middle[k]);
+        }
+      }
+      return -least_eigenvalue(block, D);
+    };
+    Real sampled = -infinite;
+    for (const std::vector<Real>& point : samples_of(box)) {
+      Box there;
+      for (const Real action : point) there.push_back(Interval::of(action));
+      const Real found = lacking(there);
+      if (std::isfinite(found)) sampled = std::max(sampled, found);
+    }
+    Real proved = -infinite;
+    for (const Part& part : parts_of(box, lacking, sampled, hessian.actions_of_own_rows(i))) {
+      proved = std::max(proved, part.bound);
+    }
+    if (!std::isfinite(proved)) return -infinite;
+    for (int l = 0; l < D; ++l) {
+      for (int h = 0; h < D; ++h) {
+        const Interval least = Interval::of(middle[at(l * D + h)]);
+        entries[place(l, h)] = l == h ? least - Interval::of(proved) : least;
+      }
+    }
+  }
+  return least_eigenvalue(entries, static_cast<Eigen::Index>(n));
+}
+
 }  // namespace
 
-BoxConstants box_constants(const Parameters& parameters, const GameExpressions& expressions, const Box& box) {
+BoxConstants box_constants(const Parameters& parameters, const GameExpressions& expressions, const Box& box,
+                           Real speed) {
   const Shape& shape = parameters.shape;
   const std::size_t n = box.size();
   const HessianBounds hessian(parameters, expressions.costs);
@@ -352,14 +564,9 @@ BoxConstants box_constants(const Parameters& parameters, const GameExpressions& 
     parameters.dynamics->jacobian(x.data(), at_rest.data(), term_entries.data());
     const Matrix gradient = full(costs, cost_entries, shape);
     const Matrix change = full(terms, term_entries, shape);
-    const auto own = [&](const Matrix& matrix, int i) {
-      Matrix rows(shape.dimension, matrix.cols());
-      for (int l = 0; l < shape.dimension; ++l) rows.row(l) = matrix.row(shape.entry(i, l));
-      return rows;
-    };
     for (int i = 0; i < shape.players; ++i) {
-      const Matrix of_cost = own(gradient, i);
-      const Matrix of_term = own(change, i);
+      const Matrix of_cost = rows_of(gradient, i, shape);
+      const Matrix of_term = rows_of(change, i, shape);
       if (of_cost.allFinite()) of_gradients[at(i)] = std::max(of_gradients[at(i)], norm_of(of_cost));
       if (of_term.allFinite()) of_dynamics[at(i)] = std::max(of_dynamics[at(i)], norm_of(of_term));
     }
@@ -371,14 +578,17 @@ BoxConstants box_constants(const Parameters& parameters, const GameExpressions& 
 
   // proofs
   std::vector<Interval> rows;
-  const auto of_cost = [&](int i, const Box& part, std::vector<Interval>& found) {
-    return hessian.rows(i, part, found);
-  };
-  constants.gradients = jacobian_bounds(shape, box, of_gradients, of_cost);
+  constants.gradients = jacobian_bounds(
+      shape, box, of_gradients,
+      {[&](int i, const Box& part, std::vector<Interval>& found) { return hessian.rows(i, part, found); },
+       [&](int i) { return hessian.actions_of_rows(i); }});
   std::vector<Interval> values;
-  constants.dynamics = jacobian_bounds(
-      shape, box, of_dynamics,
-      [&](int i, const Box& part, std::vector<Interval>& found) { return dynamics(i, part, found, values); });
+  constants.dynamics = jacobian_bounds(shape, box, of_dynamics,
+                                       {[&](int i, const Box& part, std::vector<Interval>& found) {
+                                          return dynamics.along_actions(i, part, found, values);
+                                        },
+                                        [&](int i) { return dynamics.sides_along_actions(i); }});
+  constants.velocities = velocity_bounds(parameters, dynamics, box, speed);
   std::vector<Interval> jacobian(n * n);
   const auto bound = [&](const Box& part) {
     for (int i = 0; i < shape.players; ++i) {
@@ -391,13 +601,24 @@ BoxConstants box_constants(const Parameters& parameters, const GameExpressions& 
     return -least_eigenvalue(jacobian, static_cast<Eigen::Index>(n));
   };
   Real proved = -infinite;
-  for (const Part& part : parts_of(box, bound, -least)) {
+  std::vector<int> sides;
+  for (int i = 0; i < shape.players; ++i) {
+    const std::vector<int> own = hessian.actions_of_rows(i);
+    sides.insert(sides.end(), own.begin(), own.end());
+  }
+  std::sort(sides.begin(), sides.end());
+  sides.erase(std::unique(sides.begin(), sides.end()), sides.end());
+  for (const Part& part : parts_of(box, bound, -least, sides)) {
     std::vector<Real> middle;
     for (const Interval& side : part.box) middle.push_back(middle_of(side));
     take(middle);
     proved = std::max(proved, part.bound);
   }
   constants.monotonicity = {-proved, least};
+  if (-proved < least - close * std::abs(least)) {
+    const Real by_blocks = least_by_blocks(shape, hessian, box, constants.gradients.entries);
+    constants.monotonicity.proved = std::min(least, std::max(-proved, by_blocks));
+  }
   for (int i = 0; i < shape.players; ++i) {
     constants.gradients.lipschitz[at(i)].sampled = of_gradients[at(i)];
     constants.dynamics.lipschitz[at(i)].sampled = of_dynamics[at(i)];
@@ -409,12 +630,12 @@ BoxConstants box_constants(const Parameters& parameters, const GameExpressions& 
     if (!std::isfinite(constants.gradients.lipschitz[at(i)].proved)) {
       constants.open.push_back(why_not("cost", i, hessian.rows(i, box, rows)));
     }
-    const Enclosure::Found found = dynamics(i, box, rows, values);
-    if (dynamics.uses_velocities(i)) {
-      constants.dynamics.lipschitz[at(i)].proved = infinite;
-      constants.open.push_back("the dynamics of player " + std::to_string(i + 1) + " depend on velocities");
-    } else if (!std::isfinite(constants.dynamics.lipschitz[at(i)].proved)) {
+    const Enclosure::Found found = dynamics.along_actions(i, box, rows, values);
+    if (!std::isfinite(constants.dynamics.lipschitz[at(i)].proved)) {
       constants.open.push_back(why_not("dynamics", i, found));
+    } else if (!std::isfinite(constants.velocities.lipschitz[at(i)].proved)) {
+      constants.open.push_back(
+          why_not("dynamics", i, dynamics.along_velocities(i, with_speeds(box, shape, speed), rows)));
     }
     for (int l = 0; l < shape.dimension; ++l) {
       const int entry = shape.entry(i, l);

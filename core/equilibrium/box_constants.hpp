@@ -22,19 +22,20 @@ struct JacobianBounds {
 };
 
 struct BoxConstants {
-  BoxBound monotonicity;               ///< the smallest eigenvalue of the symmetric part of dP/dx, from below
-  JacobianBounds gradients;            ///< of grad_i f_i
-  JacobianBounds dynamics;             ///< of g_i
-  std::vector<Real> dynamics_size;     ///< bounds of |g_il| over the box, at entry(i, l); infinite where none is proved
+  BoxBound monotonicity;            ///< the smallest eigenvalue of the symmetric part of dP/dx, from below
+  JacobianBounds gradients;         ///< of grad_i f_i
+  JacobianBounds dynamics;          ///< of g_i along actions while all are at rest
+  JacobianBounds velocities;        ///< of g_i along velocities
+  std::vector<Real> dynamics_size;  ///< of |g_il| at rest over the box, at entry(i, l); infinite where none is proved
   std::vector<Real> disturbance_size;  ///< bounds of |d_il(t)| for all t from the game's own, likewise
   std::vector<std::string> open;       ///< why something is not proved, one sentence each
 };
 
-/// For all joint actions in the box, whose sides are finite, at entry(i, l). The game has all of its players. Bounds of
-/// gradients are proved where the costs are defined, and none of their conditions switches, in all of the box; those of
-/// dynamics where they are defined, do not jump and do not depend on velocities. The work is bounded: the box is not
-/// cut in games with many actions.
+/// For all joint actions in the box, whose sides are finite, at entry(i, l), and all velocities of at most a speed in
+/// each coordinate. The game has all of its players. Bounds of gradients are proved where the costs are defined, and
+/// none of their conditions switches, in all of the box; those of dynamics where they are defined and do not jump. The
+/// work is bounded: the box is not cut in games with many actions.
 BoxConstants box_constants(const Parameters& parameters, const GameExpressions& expressions,
-                           const std::vector<Interval>& box);
+                           const std::vector<Interval>& box, Real speed);
 
 }  // namespace mixed_order_game

@@ -17,6 +17,14 @@ Real middle_of(const Interval& side) {
   return 0.5 * side.lower + 0.5 * side.upper;
 }
 
+std::vector<int> actions_of(const Enclosure& enclosure) {
+  std::vector<int> actions;
+  for (const Leaf& leaf : enclosure.leaves()) {
+    if (leaf.kind == LeafKind::action) actions.push_back(leaf.index);
+  }
+  return actions;
+}
+
 }  // namespace
 
 HessianBounds::HessianBounds(const Parameters& parameters, const std::vector<ExpressionCost::Text>& expressions)
@@ -66,6 +74,18 @@ const Switch* HessianBounds::kink_at(int i, const std::vector<Real>& x) const {
 
 Enclosure::Found HessianBounds::rows(int i, const std::vector<Interval>& box, std::vector<Interval>& values) const {
   return enclose(i, Columns::all, box, values);
+}
+
+Enclosure::Found HessianBounds::own_rows(int i, const std::vector<Interval>& box, std::vector<Interval>& values) const {
+  return enclose(i, Columns::own, box, values);
+}
+
+std::vector<int> HessianBounds::actions_of_rows(int i) const {
+  return players_[at(i)] == nullptr ? std::vector<int>{} : actions_of(*players_[at(i)]->all.enclosure);
+}
+
+std::vector<int> HessianBounds::actions_of_own_rows(int i) const {
+  return players_[at(i)] == nullptr ? std::vector<int>{} : actions_of(*players_[at(i)]->own.enclosure);
 }
 
 Enclosure::Found HessianBounds::enclose(int i, Columns columns, const std::vector<Interval>& box,

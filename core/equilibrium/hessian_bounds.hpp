@@ -23,6 +23,13 @@ class HessianBounds {
   /// Encloses d^2 f_i / (d x_il d x_jh) over a box of joint actions at values[l n + entry(j, h)], n = N D.
   Enclosure::Found rows(int i, const std::vector<Interval>& box, std::vector<Interval>& values) const;
 
+  /// The same along player i's own actions alone; what else is in the rows is not told.
+  Enclosure::Found own_rows(int i, const std::vector<Interval>& box, std::vector<Interval>& values) const;
+
+  /// The actions that rows(), or own_rows(), depend on.
+  [[nodiscard]] std::vector<int> actions_of_rows(int i) const;
+  [[nodiscard]] std::vector<int> actions_of_own_rows(int i) const;
+
   /// Whether f_i is proved convex in x_i at all x_i within a distance of x in each coordinate, the other players
   /// staying at x: wherever f_i is defined, which is a convex set. The distance may be infinite.
   [[nodiscard]] bool is_convex(int i, const std::vector<Real>& x, Real distance) const;

@@ -79,6 +79,14 @@ Enclosure::Enclosure(const ExpressionGraph& graph, std::vector<int> nodes)
   std::reverse(needed_.begin(), needed_.end());
 }
 
+std::vector<Leaf> Enclosure::leaves() const {
+  std::vector<Leaf> leaves;
+  for (const int k : needed_) {
+    if (graph_.node(k).operation == Operation::leaf) leaves.push_back(graph_.leaf_of(k));
+  }
+  return leaves;
+}
+
 Enclosure::Node Enclosure::of_switch(const Switch& one) const {
   const Node& s = rows_[at(one.value)];
   const Interval step = one.step < 0 ? Interval::of(1.0) : rows_[at(one.step)].value;

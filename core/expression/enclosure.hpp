@@ -14,6 +14,9 @@ class Enclosure {
   /// Of some nodes of a graph, which has to outlive it.
   Enclosure(const ExpressionGraph& graph, std::vector<int> nodes);
 
+  /// The leaves that the nodes are made of, once each.
+  [[nodiscard]] std::vector<Leaf> leaves() const;
+
   enum class Definition {
     everywhere,
     convex,  ///< the points of the box at which the expressions are defined are a convex set

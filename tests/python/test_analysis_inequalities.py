@@ -17,7 +17,7 @@ import pytest
 from numpy.typing import NDArray
 
 from mixed_order_game.theory import paper_bounds as pb
-from mixed_order_game.theory.certificate import Weights, comparison_matrix
+from mixed_order_game.theory.certificate import Certificate, Weights, comparison_matrix
 from mixed_order_game.theory.constants import (
     NO_DYNAMICS,
     DynamicsConstants,
@@ -55,6 +55,7 @@ class Sample:
 
     game: AnalysedGame
     rates: FloatArray  # (5,) V_1' to V_5' with weights 1 and P = I
+    speed: float  # |v_s|
     norms: FloatArray  # (4,) |xbar - x*|, |vbar_s|, |x_f - z_f|, |y - 1 (x) xbar|
     e: FloatArray  # (N, D)
     robust: FloatArray  # (N, D), e (d + eps - phi)
@@ -85,8 +86,10 @@ def lyapunov_parts(
     return parts, np.sum((s.W - W_star) ** 2, axis=1) / (2.0 * game.beta)
 
 
-def samples(name: str, seed: int, *, plain: bool = False, count: int = SAMPLES) -> Iterator[Sample]:
-    """Random states; plain: the loop of Theorem 2."""
+def samples(
+    name: str, seed: int, *, plain: bool = False, moved: bool = False, count: int = SAMPLES
+) -> Iterator[Sample]:
+    """Random states; plain: the loop of Theorem 2; moved: with dynamics that depend on velocities, too."""
     source, own = oracle.read_game(files(name)), read_game(files(name))
     random = np.random.default_rng(seed)
     x_star = equilibrium.nash_equilibrium(source)
@@ -144,11 +147,25 @@ def samples(name: str, seed: int, *, plain: bool = False, count: int = SAMPLES) 
         distance = max(float(np.linalg.norm(x - x_star)), float(np.linalg.norm(xbar - x_star)))
         reach = max(*np.linalg.norm((y - x_star).reshape(N, -1), axis=1).tolist(), distance)
         pulled = W_rate / game.beta - S[:, :, np.newaxis] * e[:, np.newaxis]
+        rates_of_parts = np.append(parts.imag / step, np.sum(columns.imag / step))
+        local = NO_DYNAMICS if plain else dynamics_constants(own.parameters, distance, reach)
+        if moved:  # g_i has sum_j K_ij v_j besides, and e moves with it
+            K = 10.0 ** random.uniform(-1.0, 2.0) * random.standard_normal((N, N)) * ~first
+            moving = e * (K @ np.where(first[:, np.newaxis], 0.0, p))
+            rates_of_parts[1] += moving[~first].sum()
+            rates_of_parts[2] += moving[first].sum()
+            local = replace(
+                local,
+                velocity_lipschitz=np.linalg.norm(K, axis=1),
+                first_velocities=float(np.linalg.norm(K[first], 2)) if first.any() else 0.0,
+                second_velocities=float(np.linalg.norm(K[~first], 2)) if not first.all() else 0.0,
+            )
         yield Sample(
             game=own.with_gains(
                 Gains(game.k1, game.k2, game.k3, game.k4, game.beta, game.delta, game.epsilon, game.W_max)
             ),
-            rates=np.append(parts.imag / step, np.sum(columns.imag / step)),
+            rates=rates_of_parts,
+            speed=float(np.linalg.norm(p[~first])),
             norms=np.array(
                 [
                     np.linalg.norm(xbar - x_star),
@@ -163,7 +180,7 @@ def samples(name: str, seed: int, *, plain: bool = False, count: int = SAMPLES) 
             weight_rates=np.sum(W_error * pulled, axis=1),
             second=~first,
             column_rates=np.asarray(columns.imag / step),
-            dynamics=NO_DYNAMICS if plain else dynamics_constants(own.parameters, distance, reach),
+            dynamics=local,
         )
 
 
@@ -195,11 +212,12 @@ def test_lemmas_of_the_adaptive_and_the_robust_part(name: str) -> None:
         assert np.all(s.weight_errors <= 4.0 * s.game.gains.W_max * (1.0 + 1e-12))
 
 
+@pytest.mark.parametrize("moved", [False, True])
 @pytest.mark.parametrize("name", NAMES)
-def test_comparison_matrix_bounds_the_rate(name: str) -> None:
+def test_comparison_matrix_bounds_the_rate(name: str, moved: bool) -> None:
     """V' <= -r'Theta r + D epsilon (n w_f + (N - n) w_s) for random weights and gains."""
     random = np.random.default_rng(2)
-    for s in samples(name, 2):
+    for s in samples(name, 2, moved=moved, count=SAMPLES // 3 if moved else SAMPLES):
         weights = Weights(*(10.0 ** random.uniform(-4.0, 1.0, size=3)).tolist())
         c = loop_constants(s.game.parameters)
         theta, _ = comparison_matrix(c, s.dynamics, s.game.gains, weights)
@@ -210,6 +228,16 @@ def test_comparison_matrix_bounds_the_rate(name: str) -> None:
         by_part.append(float(np.sum(of_column * s.column_rates)))
         bound = -float(r @ theta @ r) + c.dimension * noise * s.game.gains.epsilon
         slack(bound, sum(by_part), *by_part)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_level_bounds_the_velocities(name: str) -> None:
+    random = np.random.default_rng(22)
+    for s in samples(name, 22, count=SAMPLES // 3):
+        weights = Weights(*(10.0 ** random.uniform(-4.0, 1.0, size=3)).tolist())
+        halves = np.array([0.5, 0.5 * weights.velocities, 0.5 * weights.tracking, weights.estimates])
+        found = Certificate(loop_constants(s.game.parameters), weights, 1.0)
+        assert s.speed <= found.velocity_radius(float(halves @ s.norms**2), s.game.gains.k2) * (1.0 + 1e-9)
 
 
 def test_every_term_of_the_comparison_matrix_is_needed() -> None:
@@ -231,11 +259,12 @@ def test_every_term_of_the_comparison_matrix_is_needed() -> None:
     assert refuted == {(0, 1), (0, 2), (0, 3), (1, 3), (2, 3)}
 
 
+@pytest.mark.parametrize("moved", [False, True])
 @pytest.mark.parametrize("name", NAMES)
-def test_theorem_1_coefficients_bound_the_rate(name: str) -> None:
+def test_theorem_1_coefficients_bound_the_rate(name: str, moved: bool) -> None:
     """V' <= -sum Phi_i r_i^2 - sum W~'W~ + N D epsilon + 4 N D W_max, for random p: the constants hold."""
     random = np.random.default_rng(3)
-    for s in samples(name, 3):
+    for s in samples(name, 3, moved=moved, count=SAMPLES // 3 if moved else SAMPLES):
         p = float(10.0 ** random.uniform(-3.0, 0.5))
         c = constants_of(s, p)
         columns = c.players * c.coordinates

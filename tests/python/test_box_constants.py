@@ -22,7 +22,8 @@ from mixed_order_game.theory.analysis import analyse
 from mixed_order_game.theory.certificate import best_certificate
 from mixed_order_game.theory.constants import NO_DYNAMICS, dynamics_constants, loop_constants
 from mixed_order_game.theory.game import game_of_fmu, read_game
-from tests.games_by_hand import BY_HAND
+from tests.bench.larger_games import seekers
+from tests.games_by_hand import BY_HAND, fewer_households
 from tests.oracle.general_loop import Functions, own_gradients
 from tests.random_expressions import random_game
 from tests.three_players import head
@@ -56,6 +57,15 @@ def dynamics_jacobian(functions: Functions, x: FloatArray) -> FloatArray:
     return np.array(columns).reshape(x.size, x.size).T
 
 
+def velocity_jacobian(functions: Functions, x: FloatArray, v: FloatArray) -> FloatArray:
+    """(N D, N D) by central differences; players of order 1 have no velocity, and columns of zeros."""
+    steps = STEP * np.eye(x.size).reshape(-1, *x.shape)
+    columns = [
+        (functions.dynamics(x, v + step) - functions.dynamics(x, v - step)) / (2.0 * STEP) for step in steps
+    ]
+    return np.array(columns).reshape(x.size, x.size).T
+
+
 def equilibrium_of(game: Path) -> FloatArray:
     found = judge_equilibrium(game)
     assert found is not None
@@ -82,6 +92,12 @@ def check_samples(bounds: GameBounds, functions: Functions, seed: int) -> None:
         assert np.all(
             np.linalg.norm(change.reshape(N, D, N * D), 2, axis=(1, 2)) <= bounds.dynamics.lipschitz + near
         )
+        v = bounds.speed * np.where(
+            point % 4 == 0, random.choice([-1.0, 1.0], (N, D)), random.uniform(-1, 1, (N, D))
+        )
+        moving = velocity_jacobian(functions, x, v).reshape(N, D, N * D)
+        near = 1e-6 * (1.0 + np.abs(moving).max())
+        assert np.all(np.linalg.norm(moving, 2, axis=(1, 2)) <= bounds.velocities.lipschitz + near)
         if np.isfinite(bounds.dynamics_size).all():
             assert np.all(np.abs(functions.dynamics(x, np.zeros_like(x))) <= bounds.dynamics_size + 1e-12)
     times = np.concatenate([np.linspace(0.0, 50.0, 500), [1e4]])
@@ -90,15 +106,21 @@ def check_samples(bounds: GameBounds, functions: Functions, seed: int) -> None:
     assert bounds.sampled_monotonicity >= bounds.monotonicity
     assert np.all(bounds.gradients.sampled <= bounds.gradients.lipschitz)
     assert np.all(bounds.dynamics.sampled <= bounds.dynamics.lipschitz)
+    assert np.all(bounds.velocities.sampled <= bounds.velocities.lipschitz)
 
 
 @pytest.mark.parametrize("name", sorted(set(BY_HAND) - {"two_hundred_households"}))
 def test_bounds_of_the_example_games_hold_at_samples(name: str) -> None:
     x_star = equilibrium_of(GAMES / f"{name}.toml")
     distance = 0.02 if name == "rate_allocation" else 0.15  # whose logarithms end at 0
-    bounds = game_bounds(GAMES / f"{name}.toml", box_around(x_star, distance), x_star)
+    bounds = game_bounds(GAMES / f"{name}.toml", box_around(x_star, distance), x_star, speed=0.7)
     assert bounds.monotone
+    assert bounds.open == ()
     assert bounds.reach == pytest.approx(distance)
+    # proofs are close to samples
+    assert bounds.monotonicity >= 0.7 * bounds.sampled_monotonicity
+    for found in (bounds.gradients, bounds.dynamics, bounds.velocities):
+        assert np.all(found.lipschitz <= 1.05 * found.sampled)
     check_samples(bounds, BY_HAND[name](), 5)
 
 
@@ -106,7 +128,25 @@ def test_what_a_part_proves_its_halves_do_not_lose() -> None:
     game = GAMES / "source_seeking.toml"
     x_star = equilibrium_of(game)
     bounds = game_bounds(game, box_around(x_star, 0.6), x_star)
-    assert bounds.monotonicity > 0.93 * bounds.sampled_monotonicity
+    assert bounds.monotonicity > 0.98 * bounds.sampled_monotonicity
+
+
+@pytest.mark.parametrize(
+    ("text", "distance", "share"),
+    [(fewer_households(50), 0.5, 0.98), (seekers(21)[0], 1.5, 0.8)],
+    ids=["households", "seekers"],
+)
+def test_bounds_of_games_too_large_to_cut_are_close_to_samples(
+    text: str, distance: float, share: float, tmp_path: Path
+) -> None:
+    game = tmp_path / "game.toml"
+    game.write_text(text, encoding="utf-8")
+    x_star = equilibrium_of(game)
+    assert x_star.size > 40
+    bounds = game_bounds(game, box_around(x_star, distance), x_star)
+    assert bounds.monotonicity > share * bounds.sampled_monotonicity > 0.0
+    for found in (bounds.gradients, bounds.dynamics):
+        assert found.lipschitz.max() <= 1.06 * found.sampled.max()
 
 
 @pytest.mark.parametrize("seed", range(10))
@@ -159,6 +199,68 @@ def test_of_quadratic_games_they_are_the_exact_constants(name: str, tmp_path: Pa
         assert over_box.first_tracking == pytest.approx(linear.first_tracking, rel=1e-9)
     beyond = dynamics_constants(replace(exact.parameters, bounds=bounds), 3.1, 1.0)
     assert np.isinf(beyond.lipschitz).all()
+
+
+DRIVERS = (
+    head(k3=400.0, epsilon=0.1).replace("k4 = 20.0", "k4 = 900.0")
+    + """[parameters]
+slope = 0.3
+[defaults]
+order = 2
+x0 = 0.4
+z0 = "x0"
+y0 = "x0"
+cost = { expression = "x[i]^2 + 0.1 * cosh(x[i]) - 0.2 * x[i] * exp(-slope * sum(x[j] for j in 1..N))" }
+dynamics = { expression = "0.2 * sin(x[i]) - %s" }
+disturbance = { expression = "0.5 * square(t, 3)" }
+[[player]]
+name = "a"
+order = 1
+dynamics = { expression = "0.3 * tanh(v[2]) * cos(x[3])" }
+[[player]]
+name = "b"
+x0 = -0.2
+[[player]]
+name = "c"
+"""
+)
+
+
+def test_dynamics_that_depend_on_velocities_are_judged_up_to_a_speed(tmp_path: Path) -> None:
+    game = tmp_path / "drivers.toml"
+    game.write_text(DRIVERS % "0.3 * v[i] * abs(v[i])", encoding="utf-8")
+    fmu = build_fmu(game, game.with_suffix(".fmu"))
+    slow, fast = analyse(fmu, box=1.0, speed=1.0), analyse(fmu, box=1.0, speed=2.0)
+    for found, speed in ((slow, 1.0), (fast, 2.0)):
+        assert found.value("box", "speed") == speed
+        assert found.value("box", "nu_1") == pytest.approx(0.3, rel=0.01)
+        assert found.value("box", "nu_2") == pytest.approx(0.6 * speed, rel=0.01)
+        assert float(found.value("box", "nu_2 sampled")) <= float(found.value("box", "nu_2"))
+        assert found.bounds is not None
+        assert found.bounds.dynamics_size.max() == pytest.approx(
+            0.2 * np.sin(1.0 + found.bounds.x_star.max()), rel=0.2
+        )
+        assert f"max nu_i = {0.6 * speed:.1f}" in " ".join(each.figures for each in found.hypotheses)
+    for threshold in ("k4*", "sharper k4*"):
+        assert float(slow.value("theorem 1", threshold)) < float(fast.value("theorem 1", threshold))
+    found = analyse(fmu)
+    design = found.demonstrations[0]
+    assert design.complete
+    gains = {name: value for name, value in vars(design.design.gains).items() if name != "W_max"}
+    settled = design.design.settling_time
+    run = mog.run(fmu, start_values=gains, stop_time=2.0 * settled, step=0.01, tolerance=1e-8)
+    assert run.nash_error[run.time >= settled].max() <= 1.01 * design.design.radius
+    assert np.abs(run.v[:, 1:]).max() <= float(found.value("box", "speed"))
+    with pytest.raises(mog.GameError, match="speed = -1 is not positive"):
+        analyse(fmu, speed=-1.0)
+
+
+def test_friction_with_a_sign_is_not_proved(tmp_path: Path) -> None:
+    game = tmp_path / "drivers.toml"
+    game.write_text(DRIVERS % "0.3 * sign(v[i])", encoding="utf-8")
+    told = " ".join(analyse(game, box=1.0).verdicts)
+    assert 'the dynamics of player 2 may switch in the box: "sign(v[i])"' in told
+    assert "Theorem 1 is not judged" in told
 
 
 SELLERS = (

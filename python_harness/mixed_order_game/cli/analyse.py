@@ -29,6 +29,13 @@ def analyse(
             " by default as far as the starts, if proved there.",
         ),
     ] = None,
+    speed: Annotated[
+        float | None,
+        typer.Option(
+            help="Of dynamics that depend on velocities: constants hold where no coordinate of a velocity is"
+            " larger; by default as at the start, larger where the designed gains ask for it.",
+        ),
+    ] = None,
     tables: Annotated[
         bool, typer.Option("--tables", help="Print every figure and hypothesis after the verdicts.")
     ] = False,
@@ -58,6 +65,7 @@ def analyse(
             square=square,
             radius=radius,
             box=box,
+            speed=speed,
             progress=show,
         )
     if as_json:

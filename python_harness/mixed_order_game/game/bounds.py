@@ -1,4 +1,4 @@
-"""What is proved of a game's costs, dynamics and disturbances over a box of joint actions.
+"""What is proved of a game's costs, dynamics and disturbances over a box of joint actions and speeds.
 
 The host tool proves: it encloses the second derivatives of the costs and the derivatives of the dynamics by
 intervals, on the box cut into parts, and looks at sample points beside.
@@ -55,8 +55,10 @@ class GameBounds:
     monotonicity: float  # m of Assumption 3, proved; -inf where nothing is
     sampled_monotonicity: float  # the smallest of the samples, at least what is proved
     gradients: JacobianBounds  # of grad_i f_i: l_i of Assumption 1
-    dynamics: JacobianBounds  # of g_i: eta_i of Assumption 5, in 1/s
-    dynamics_size: FloatArray  # (N, D), of |g_il| over the box; inf where nothing is proved
+    dynamics: JacobianBounds  # of g_i along actions, all at rest: eta_i of Assumption 5, in 1/s
+    speed: float  # largest |v_jl| that the next ones hold for, in the game's length unit per s
+    velocities: JacobianBounds  # of g_i along velocities: nu_i, in 1/s
+    dynamics_size: FloatArray  # (N, D), of |g_il| over the box, all at rest; inf where nothing is proved
     disturbance_size: FloatArray  # (N, D), of |d_il(t)| for all t; inf likewise
     first_gradients: FloatArray  # (N, D), grad_i f_i(y_i(0))
     open: tuple[str, ...]  # why something is not proved
@@ -67,21 +69,34 @@ class GameBounds:
         return self.box.reach(self.x_star)
 
     @property
+    def use_velocities(self) -> bool:
+        """Whether dynamics depend on velocities somewhere, or are not proved not to."""
+        return bool(np.any(self.velocities.lipschitz > 0.0))
+
+    @property
     def monotone(self) -> bool:
         """Whether m > 0 and Lipschitz constants of all gradients are proved."""
         return self.monotonicity > 0.0 and bool(np.isfinite(self.gradients.lipschitz).all())
 
 
 def game_bounds(
-    game: Path, box: Box, x_star: FloatArray, changes: Mapping[str, float | int | bool] | None = None
+    game: Path,
+    box: Box,
+    x_star: FloatArray,
+    changes: Mapping[str, float | int | bool] | None = None,
+    *,
+    speed: float = 0.0,
 ) -> GameBounds:
     """Bounds of a game file (.toml) or of an FMU's own, with start values of the FMU's variables changed.
+
+    Those along velocities hold where no velocity's coordinate is larger than the speed.
 
     Raises GameError if the game is none or does not take the changes, BuildError without the host tool.
     """
     pairs = zip(box.lower.ravel().tolist(), box.upper.ravel().tolist(), strict=True)
     settings = (f"{json.dumps(name)} = {float(value)!r}" for name, value in (changes or {}).items())
-    request = f"box = {[list(pair) for pair in pairs]}\nsettings = {{ {', '.join(settings)} }}\n"
+    sides = [list(pair) for pair in pairs]
+    request = f"box = {sides}\nspeed = {float(speed)!r}\nsettings = {{ {', '.join(settings)} }}\n"
     with file_of(game) as file:
         told = ask("--constants", file, request)
     return GameBounds(
@@ -91,6 +106,8 @@ def game_bounds(
         sampled_monotonicity=_number(told["monotonicity"]["sampled"], math.nan),
         gradients=_jacobian(told["gradients"]),
         dynamics=_jacobian(told["dynamics"]),
+        speed=speed,
+        velocities=_jacobian(told["velocities"]),
         dynamics_size=_array(told["dynamics_size"]),
         disturbance_size=_array(told["disturbance_size"]),
         first_gradients=_array(told["first_gradients"]),

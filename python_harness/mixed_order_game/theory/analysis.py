@@ -27,6 +27,7 @@ def analyse(
     square: bool = True,
     radius: float = 0.1,
     box: float | None = None,
+    speed: float | None = None,
     progress: Progress | None = None,
 ) -> Analysis:
     """Judge a game's gains: thresholds of the theorems, exact spectrum, guaranteed radius, and runs.
@@ -50,6 +51,9 @@ def analyse(
     box
         Of games with expressions: constants hold where every action is within this distance of x*, in each
         coordinate; by default as far as the starts, nearer where m > 0 is not proved there.
+    speed
+        Of games whose dynamics depend on velocities: constants hold where no velocity's coordinate is larger,
+        in the game's length unit per s; by default as at the start, larger where the designed gains ask it.
     progress
         Called with the name of a step and the part of it done, 0 to 1.
 
@@ -61,8 +65,8 @@ def analyse(
     Raises
     ------
     GameError
-        For a game that is missing, is none or has no unique Nash equilibrium, and for a radius or box
-        that is not positive; for a box of a game of coefficients, which needs none.
+        For a game that is missing, is none or has no unique Nash equilibrium, and for a radius, box or
+        speed that is not positive; for a box or speed of a game of coefficients, which needs none.
     ModelError, BuildError, VariableError, SimulationError
         As reading, building and running do.
 
@@ -75,6 +79,8 @@ def analyse(
     radius = number_argument(radius, "radius", GameError)
     if box is not None:
         box = number_argument(box, "box", GameError)
+    if speed is not None:
+        speed = number_argument(speed, "speed", GameError)
     if not (math.isfinite(radius) and radius > 0.0):
         raise GameError(f"radius = {radius:g} is not positive")
     source = source_of(game)
@@ -83,8 +89,8 @@ def analyse(
     if expression:
         if not square:
             raise GameError(f"{source}: only coefficients have a square term to remove; {expression}")
-        return local_analysis(file, source, changes or {}, box=box, radius=radius)
-    if box is not None:
+        return local_analysis(file, source, changes or {}, box=box, speed=speed, radius=radius)
+    if box is not None or speed is not None:
         raise GameError(f"{source}: its costs and dynamics are of coefficients, whose constants need no box")
     with nullcontext(file) if square else _without_square(file) as file:
         analyst = Analyst(

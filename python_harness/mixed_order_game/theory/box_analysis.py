@@ -2,7 +2,8 @@
 
 The theorems ask for m, l_i and eta_i on the whole space. What their proofs use is less: that x, xbar and all
 estimates stay where the constants hold. Here they hold in a box, so every statement is about the largest
-sublevel set of V whose balls about x* lie in it: V falls on its border, so no trajectory leaves it.
+sublevel set of V whose balls about x* lie in it: V falls on its border, so no trajectory leaves it. Where
+dynamics depend on velocities, constants hold up to a speed, and so does the set.
 """
 
 import math
@@ -37,7 +38,7 @@ MARGIN = 1.1
 HALVINGS = 12
 """How often a default box is halved, at most, until m > 0 is proved."""
 
-ROUNDS = 4
+ROUNDS = 6
 """How often it is widened, at most, so that the set of the initial state fits in."""
 
 
@@ -53,27 +54,41 @@ class BoxFindings:
 
 
 def box_analysis(
-    fmu: Path, x_star: FloatArray, changes: Mapping[str, Value], *, box: float | None, radius: float
+    fmu: Path,
+    x_star: FloatArray,
+    changes: Mapping[str, Value],
+    *,
+    box: float | None,
+    speed: float | None,
+    radius: float,
 ) -> BoxFindings:
     """Constants, thresholds and designed gains over a box.
 
     box: every action within this distance of x* (N, D); by default as far as the starts, farther where the
-    set of the initial state asks for it, nearer where m > 0 is not proved. radius: lim sup of |x - x*| that
-    the designed gains guarantee. Raises GameError if the box is not positive.
+    set of the initial state asks for it, nearer where m > 0 is not proved. speed: no |v_jl| is larger; by
+    default as at the start, larger where that set asks for it. radius: lim sup of |x - x*| that the designed
+    gains guarantee. Raises GameError if the box or the speed is not positive.
     """
-    if box is not None and not (math.isfinite(box) and box > 0.0):
-        raise GameError(f"box = {box:g} is not positive")
+    for name, value in (("box", box), ("speed", speed)):
+        if value is not None and not (math.isfinite(value) and value > 0.0):
+            raise GameError(f"{name} = {value:g} is not positive")
     try:
         game = game_of_fmu(fmu, changes)
     except GameError as error:
         return BoxFindings((), (), (), (f"Theorems 1 and 2 are not judged: {error}.",), None)
     game = replace(game, parameters=replace(game.parameters, x_star=x_star))
 
-    def judged(distance: float) -> _Judge:
-        found = game_bounds(fmu, box_around(x_star, distance), x_star, changes)
-        return _Judge(game, found, distance, radius)
+    def bounds_within(distance: float, largest_speed: float) -> GameBounds:
+        return game_bounds(fmu, box_around(x_star, distance), x_star, changes, speed=largest_speed)
 
-    return (_by_default(game.parameters, judged) if box is None else judged(box)).findings()
+    def judged(distance: float, largest_speed: float) -> _Judge:
+        return _Judge(game, bounds_within(distance, largest_speed), distance, radius)
+
+    first_speed = speed or 0.0
+    if speed is None and "dynamics" in game.parameters.expressions:
+        first_speed = MARGIN * fastest_start(game.parameters, bounds_within(0.0, 0.0).first_gradients)
+    judge = _where_monotone(game.parameters, judged, first_speed) if box is None else judged(box, first_speed)
+    return _widened(judge, judged, distance=box is None, speed=speed is None).findings()
 
 
 def farthest_start(parameters: GameParameters) -> float:
@@ -85,28 +100,59 @@ def farthest_start(parameters: GameParameters) -> float:
     return largest if largest > 0.0 else 1.0
 
 
-def _by_default(parameters: GameParameters, judged: "Callable[[float], _Judge]") -> "_Judge":
+def fastest_start(parameters: GameParameters, gradients: FloatArray) -> float:
+    """Largest |v0| or k2 |grad_i f_i(y_i(0))| of a coordinate of order 2; 1 if all are 0.
+
+    gradients (N, D) are grad_i f_i(y_i(0)). Where e is small, v is -k2 grad_i f_i(y_i).
+    """
+    second = ~parameters.first_order
+    starts = (parameters.v0[second], parameters.k2 * gradients[second])
+    largest = max(float(np.abs(each).max(initial=0.0)) for each in starts)
+    return largest if 0.0 < largest < math.inf else 1.0
+
+
+def _where_monotone(
+    parameters: GameParameters, judged: "Callable[[float, float], _Judge]", speed: float
+) -> "_Judge":
+    """Over the box of the starts, or a nearer one if m > 0 is proved there alone."""
     farthest = MARGIN * farthest_start(parameters)
-    judge = widest = judged(farthest)
+    judge = widest = judged(farthest, speed)
     for halving in range(1, HALVINGS + 1):
         if judge.bounds.monotone:
             break
-        judge = judged(math.ldexp(farthest, -halving))
+        judge = judged(math.ldexp(farthest, -halving), speed)
     if not judge.bounds.monotone:
         return widest
     if judge is not widest:
+        judge.is_nearer = True
         judge.verdicts.append(
             f"As far from x* as the starts, within {farthest:.3g}, no strong monotonicity is proved: m is "
             f"{widest.bounds.sampled_monotonicity:.4g} at sample points."
         )
-        return judge
+    return judge
+
+
+def _widened(
+    judge: "_Judge", judged: "Callable[[float, float], _Judge]", *, distance: bool, speed: bool
+) -> "_Judge":
+    """Over a box and up to a speed that the set of the initial state fits in, if that is soon found."""
     for _ in range(ROUNDS):
-        wanted = MARGIN * judge.distance_for_start()
-        if not wanted > judge.distance:
+        own = wanted = (judge.distance, judge.bounds.speed)
+        design = judge.design() if judge.applicable else None
+        if design is None:
             break
-        wider = judged(wanted)
-        if not wider.bounds.monotone:
+        farther, faster = judge.reach_for_start(design)
+        if distance and not judge.is_nearer:
+            wanted = (max(wanted[0], MARGIN * farther), wanted[1])
+        if speed and judge.bounds.use_velocities:
+            wanted = (wanted[0], max(wanted[1], MARGIN * faster))
+        if wanted == own:
             break
+        wider = judged(*wanted)
+        found = wider.design() if wider.applicable else None
+        if found is None or wider.share(found) <= judge.share(design):
+            break
+        wider.is_nearer, wider.verdicts = judge.is_nearer, judge.verdicts
         judge = wider
     return judge
 
@@ -121,10 +167,21 @@ class _Judge:
         self.constants = loop_constants(parameters)
         self.rows: list[Row] = []
         self.verdicts: list[str] = []
+        self.is_nearer = False  # than the starts are
 
     @property
     def where(self) -> str:
         return f"where every action is within {self.distance:.3g} of x*"
+
+    @property
+    def where_slow(self) -> str:
+        """The same for what depends on velocities, too."""
+        slow = f" and no velocity's coordinate exceeds {self.bounds.speed:.3g}"
+        return self.where + (slow if self.bounds.use_velocities else "")
+
+    @property
+    def largest_speed(self) -> float:
+        return self.bounds.speed if self.bounds.use_velocities else math.inf
 
     @property
     def applicable(self) -> bool:
@@ -142,19 +199,25 @@ class _Judge:
             parameters = replace(parameters, k2=k2)
         return float(initial_errors(parameters).level(certificate.weights)[0])
 
-    def distance_for_start(self) -> float:
-        """Distance at which the designed gains' sublevel set of the initial state fits in the box."""
-        design = self.design()
-        if design is None:
-            return 0.0
-        start = self.start_level(design.certificate)
-        return self.distance * math.sqrt(start / design.domain.level)
+    def reach_for_start(self, design: Design) -> tuple[float, float]:
+        """Distance and speed at which the designed gains' sublevel set of the initial state fits in."""
+        start, certificate = self.start_level(design.certificate), design.certificate
+        distance = self.distance * math.sqrt(start / certificate.level_within(self.bounds.reach))
+        return distance, certificate.velocity_radius(start, design.gains.k2)
+
+    def share(self, design: Design) -> float:
+        """Level of the designed gains' set over that of the start, which it holds from 1 on."""
+        return design.domain.level / self.start_level(design.certificate)
 
     def design(self) -> Design | None:
         """Gains above all thresholds; None if there are none."""
         try:
             return design_within(
-                self.game, k2=self.game.gains.k2, radius=self.radius, reach=self.bounds.reach
+                self.game,
+                k2=self.game.gains.k2,
+                radius=self.radius,
+                reach=self.bounds.reach,
+                speed=self.largest_speed,
             )
         except ArithmeticError:
             return None
@@ -177,10 +240,14 @@ class _Judge:
         self._row("box", "distance", self.distance, "L", "of every action from x*, at most")
         self._row("box", "m", b.monotonicity, "1", "strong monotonicity there (Assumption 3), proved")
         self._row("box", "m sampled", b.sampled_monotonicity, "1", "smallest at sample points")
-        for letter, unit, found, meaning in (
+        kinds = [
             ("l", "1", b.gradients, "Lipschitz constant of the own gradient there (Assumption 1)"),
             ("eta", "1/s", b.dynamics, "Lipschitz constant of g there (Assumption 5)"),
-        ):
+        ]
+        if b.use_velocities:
+            self._row("box", "speed", b.speed, "L/s", "of every velocity's coordinate, at most")
+            kinds.append(("nu", "1/s", b.velocities, "Lipschitz constant of g along velocities there"))
+        for letter, unit, found, meaning in kinds:
             for kind, values in (("", found.lipschitz), (" sampled", found.sampled)):
                 told = "proved" if not kind else "largest at sample points"
                 if len(values) <= LISTED:
@@ -188,7 +255,7 @@ class _Judge:
                         self._row("box", f"{letter}_{i}{kind}", value, unit, f"{meaning}, {told}")
                 else:
                     self._row("box", f"max {letter}_i{kind}", float(values.max()), unit, f"{meaning}, {told}")
-        self._row("box", "|g|", float(b.dynamics_size.max()), "L/s", "largest |g_il| there, proved")
+        self._row("box", "|g|", float(b.dynamics_size.max()), "L/s", "largest |g_il| there at rest, proved")
         self._row("box", "|d|", float(b.disturbance_size.max()), "L/s", "largest |d_il(t)|, proved")
         sampled = f"{b.sampled_monotonicity:.4g} at sample points"
         if b.monotone:
@@ -265,12 +332,16 @@ class _Judge:
             told = "; ".join(f"{each.name} ({each.figures})" for each in undecided)
             self.verdicts.append(f"No hypothesis of Theorem 1 fails for the given gains; open: {told}.")
         else:
-            self.verdicts.append(f"Every hypothesis of Theorem 1 holds for the given gains {self.where}.")
+            self.verdicts.append(
+                f"Every hypothesis of Theorem 1 holds for the given gains {self.where_slow}."
+            )
         return tuple(hypotheses)
 
     def _assumptions(self) -> list[Hypothesis]:
         b, c, p = self.bounds, self.constants, self.game.parameters
         eta, disturbed = float(b.dynamics.lipschitz.max()), float(b.disturbance_size.max())
+        nu = float(b.velocities.lipschitz.max())
+        along = f", max nu_i = {nu:.4g} where |v_jl| <= {b.speed:.4g}" if b.use_velocities else ""
         connected = not unreached(p.adjacency) and c.slowest_consensus > 0.0
         return [
             Hypothesis(
@@ -288,8 +359,8 @@ class _Judge:
             ),
             Hypothesis(
                 "Assumption 5 in the box: g Lipschitz, d bounded",
-                holds=True if math.isfinite(eta) and math.isfinite(disturbed) else None,
-                figures=f"max eta_i = {eta:.4g}, max |d_il| = {disturbed:.4g}",
+                holds=True if math.isfinite(eta + nu + disturbed) else None,
+                figures=f"max eta_i = {eta:.4g}, max |d_il| = {disturbed:.4g}{along}",
             ),
         ]
 

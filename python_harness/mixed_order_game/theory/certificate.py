@@ -18,6 +18,16 @@ and off it minus half of
     velocities, estimates    w_s (k2 k3 ||B_s M|| + eta_s) + 2 p sqrt(N)
     tracking, estimates      w_f (k2 l_f + eta_f).
 
+Dynamics g_i(x, v) differ from g_i(x, 0) by at most nu_s |v_s| in the rows of order 2, nu_f |v_s| in those
+of order 1, and |v_s| <= |vbar_s| + k2 (||h_s|| |xbar - x*| + l_s |y - 1 (x) xbar|): the diagonal has
+w_s (k4 - nu_s) in place of w_s k4, and off it comes minus half of
+
+    actions, velocities      w_s nu_s k2 ||h_s||
+    actions, tracking        w_f nu_f k2 ||h_s||
+    velocities, tracking     w_f nu_f
+    velocities, estimates    w_s nu_s k2 l_s
+    tracking, estimates      w_f nu_f k2 l_s.
+
 The loop has the rate K_0 if Theta >= K_0 diag(1/2, w_s/2, w_f/2, p). The paper splits every cross term by a
 fixed rule and sets w_s = w_f = 1, which costs what its thresholds show: here any k2 > 0 can do, k1 has only
 to exceed eta_ff (nothing, without unknown dynamics), and k4* stays bounded as k3 grows, where the paper's k4*
@@ -101,6 +111,14 @@ class Certificate:
         """Largest |y_i - x*| with V <= level: sqrt(level (2 + 1/p)), from |y_i - xbar| + |xbar - x*|."""
         return math.sqrt(level * (2.0 + 1.0 / self.weights.estimates))
 
+    def velocity_radius(self, level: float, k2: float) -> float:
+        """Largest |v_s| with V <= level, as |v_s| <= |vbar_s| + k2 |[grad_i f_i(y_i)]_s|."""
+        c = self.constants
+        if not c.second_players:
+            return 0.0
+        squares = 2.0 * (k2 * c.second_rows_norm) ** 2 + 2.0 / self.weights.velocities
+        return math.sqrt(level * (squares + (k2 * c.hessian_norm) ** 2 / self.weights.estimates))
+
     def level_within(self, reach: float, *, tracking: bool = True) -> float:
         """Largest level whose set has |xbar - x*|, |y_i - x*| and, with tracking, |x - x*| at most reach."""
         radii = [math.sqrt(2.0), self.estimate_radius(1.0)]
@@ -118,17 +136,21 @@ def comparison_matrix(
     k1, k2, k3, k4 = gains.k1, gains.k2, gains.k3, gains.k4
     w_s, w_f, p = weights.velocities, weights.tracking, weights.estimates
     theta = np.zeros((4, 4))
-    theta[ACTIONS, VELOCITIES] = 1.0
-    theta[ACTIONS, TRACKING] = w_f * k2 * c.first_rows_norm
+    nu_s, nu_f = w_s * g.second_velocities, w_f * g.first_velocities
+    actions_speed, estimates_speed = k2 * c.second_rows_norm, k2 * c.hessian_norm
+    theta[ACTIONS, VELOCITIES] = 1.0 + nu_s * actions_speed
+    theta[ACTIONS, TRACKING] = w_f * k2 * c.first_rows_norm + nu_f * actions_speed
     theta[ACTIONS, ESTIMATES] = k2 * c.estimate_coupling(p)
-    theta[VELOCITIES, TRACKING] = w_s * g.second_tracking
-    theta[VELOCITIES, ESTIMATES] = w_s * (k2 * k3 * c.exact_b + g.second_estimates) + 2.0 * p * math.sqrt(
-        c.players
+    theta[VELOCITIES, TRACKING] = w_s * g.second_tracking + nu_f
+    theta[VELOCITIES, ESTIMATES] = (
+        w_s * (k2 * k3 * c.exact_b + g.second_estimates)
+        + 2.0 * p * math.sqrt(c.players)
+        + nu_s * estimates_speed
     )
-    theta[TRACKING, ESTIMATES] = w_f * (k2 * c.first_lipschitz + g.first_estimates)
+    theta[TRACKING, ESTIMATES] = w_f * (k2 * c.first_lipschitz + g.first_estimates) + nu_f * estimates_speed
     theta = -0.5 * (theta + theta.T)
     theta[ACTIONS, ACTIONS] = k2 * c.monotonicity
-    theta[VELOCITIES, VELOCITIES] = w_s * k4
+    theta[VELOCITIES, VELOCITIES] = w_s * (k4 - g.second_velocities)
     theta[TRACKING, TRACKING] = w_f * (k1 - g.first_tracking)
     theta[ESTIMATES, ESTIMATES] = 2.0 * p * (k3 * c.slowest_consensus - k2 * c.estimate_pull)
     present = [ACTIONS, *_groups(c, tracking=tracking), ESTIMATES]

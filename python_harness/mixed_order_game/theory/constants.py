@@ -9,7 +9,7 @@ of the Jacobian between two joint actions of the box lie within the same bounds,
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -109,6 +109,11 @@ class LoopConstants:
     def first_rows_norm(self) -> float:
         """||h_f||, Lipschitz constant of the rows of order 1; 0 if there are none."""
         return self._norm(self.first) if self.first_players else 0.0
+
+    @property
+    def second_rows_norm(self) -> float:
+        """||h_s||, the same of the rows of order 2."""
+        return self._norm(~self.first) if self.second_players else 0.0
 
     @property
     def first_lipschitz(self) -> float:
@@ -228,6 +233,13 @@ class DynamicsConstants:
     second_tracking: float  # the same for rows of order 2
     first_estimates: float  # gain of y - 1 (x) xbar in [g_i(xbar) - g_i(y_i)], order 1
     second_estimates: float  # the same for order 2
+    velocity_lipschitz: FloatArray = field(default_factory=lambda: np.zeros(1))  # (N,), nu_i
+    first_velocities: float = 0.0  # gain of v_s in [g_i(x, v) - g_i(x, 0)], rows of order 1
+    second_velocities: float = 0.0  # the same for rows of order 2
+
+    def of_velocities(self, players: NDArray[np.bool_]) -> float:
+        """max nu_i of some of the players; 0 if there are none."""
+        return float(np.broadcast_to(self.velocity_lipschitz, players.shape)[players].max(initial=0.0))
 
     @property
     def largest(self) -> float:
@@ -284,11 +296,13 @@ def dynamics_constants(
 
 def _over_box(parameters: GameParameters, bounds: GameBounds, radius: float) -> DynamicsConstants:
     first = parameters.first_order
-    if radius > bounds.reach * (1.0 + ROUNDING) or not np.isfinite(bounds.dynamics.lipschitz).all():
+    along_actions, along_velocities = bounds.dynamics.lipschitz, bounds.velocities.lipschitz
+    if radius > bounds.reach * (1.0 + ROUNDING) or not np.isfinite(along_actions + along_velocities).all():
         return DynamicsConstants(
             np.full(parameters.players, math.inf), math.inf, math.inf, math.inf, math.inf
         )
     largest = np.abs(bounds.dynamics.middle) + bounds.dynamics.radius
+    by_velocities = np.abs(bounds.velocities.middle) + bounds.velocities.radius
     rows = np.repeat(first, parameters.dimension)
 
     def norm(matrix: FloatArray) -> float:
@@ -301,13 +315,17 @@ def _over_box(parameters: GameParameters, bounds: GameBounds, radius: float) -> 
         second_tracking=norm(largest[~rows][:, rows]),
         first_estimates=float(own[first].max(initial=0.0)),
         second_estimates=float(own[~first].max(initial=0.0)),
+        velocity_lipschitz=along_velocities,
+        first_velocities=norm(by_velocities[rows]),
+        second_velocities=norm(by_velocities[~rows]),
     )
 
 
 def dynamics_bound(parameters: GameParameters, radius: float) -> FloatArray:
     """A bound (N, D) of |g_il(y)| for |y - x*| <= r: |g_il(x*)| + r |G_il + 2 H_il x*| + r^2 max_j |H_ijl|.
 
-    Exact for linear g. The bounds over a box serve balls that lie in it.
+    Exact for linear g. Of dynamics that depend on velocities it is one of |g_il(y, 0)|.
+    The bounds over a box serve balls that lie in it.
     """
     if parameters.bounds is not None:
         known = radius <= parameters.bounds.reach * (1.0 + ROUNDING)

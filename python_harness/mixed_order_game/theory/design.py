@@ -97,8 +97,10 @@ def sharper_design(game: AnalysedGame, *, k2: float, radius: float, tracking_bou
     return _finished(game, gains, Certificate(constants, weights, proved), level, radius)
 
 
-def design_within(game: AnalysedGame, *, k2: float, radius: float, reach: float) -> Design:
-    """A design by the comparison matrix on the largest sublevel set in the balls |y - x*| <= reach.
+def design_within(
+    game: AnalysedGame, *, k2: float, radius: float, reach: float, speed: float = math.inf
+) -> Design:
+    """A design by the comparison matrix on the largest sublevel set with |y - x*| <= reach, |v_s| <= speed.
 
     For games whose constants are those of a box; whether the set holds the initial state is not asked.
     Raises ArithmeticError if no gains do.
@@ -117,7 +119,11 @@ def design_within(game: AnalysedGame, *, k2: float, radius: float, reach: float)
     )
     proved = proved_rate(constants, local, gains, thresholds.weights)
     certificate = Certificate(constants, thresholds.weights, proved)
-    return _finished(game, gains, certificate, certificate.level_within(reach), radius)
+    level = certificate.level_within(reach)
+    fastest = certificate.velocity_radius(level, k2)
+    if fastest > speed:
+        level *= (speed / fastest) ** 2
+    return _finished(game, gains, certificate, level, radius)
 
 
 def paper_design(game: AnalysedGame, *, radius: float, factor: float = 1.1) -> Design:
@@ -173,6 +179,8 @@ def paper_constants(
         pair=scaled_identity(c.slowest_consensus, p),
         first_dynamics=float(dynamics.lipschitz[first].max(initial=0.0)),
         second_dynamics=float(dynamics.lipschitz[~first].max(initial=0.0)),
+        first_velocities=dynamics.of_velocities(first),
+        second_velocities=dynamics.of_velocities(~first),
         dynamics_at_equilibrium=float(dynamics_bound(game.parameters, 0.0).max()),
         disturbance=float(game.parameters.disturbance_bound.max()),
     )

@@ -15,11 +15,17 @@ from .linearized import gradient_jacobian, linearized_loop
 
 
 def local_analysis(
-    fmu: Path, source: Path, changes: Mapping[str, Value], *, box: float | None, radius: float
+    fmu: Path,
+    source: Path,
+    changes: Mapping[str, Value],
+    *,
+    box: float | None,
+    speed: float | None,
+    radius: float,
 ) -> Analysis:
     """Spectrum and monotonicity at x*, said to be local, and the theorems with the constants of a box.
 
-    source is what the user named; box and radius are those of `box_analysis`.
+    source is what the user named; box, speed and radius are those of `box_analysis`.
 
     Raises ModelError and SimulationError as linearized_loop does, GameError if there is no such x*.
     """
@@ -40,7 +46,7 @@ def local_analysis(
         Row("local", "stable", abscissa < 0.0, "1", f"unperturbed loop exponentially stable{where}"),
         Row("local", "slowest rate", -abscissa, "1/s", "minus the spectral abscissa"),
     )
-    found = box_analysis(fmu, loop.x_star, changes, box=box, radius=radius)
+    found = box_analysis(fmu, loop.x_star, changes, box=box, speed=speed, radius=radius)
     kind = "strongly monotone" if monotonicity > 0.0 else "not strongly monotone"
     verdicts = (
         _subject(model.expressions),

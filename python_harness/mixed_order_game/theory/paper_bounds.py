@@ -10,6 +10,8 @@ Every coefficient here was derived again. What was found, with D = 1 as in the p
   H_1 multiplies y' alone, which depends on y - 1 (x) xbar and not on the rate of xbar. The robust term
   gives e (d + eps - phi) <= epsilon: tanh(K delta e / epsilon) in the lemma |eta| - eta tanh(eta / s) <= K s
   with eta = delta e, s = epsilon / K.
+- Dynamics of the velocities are not the paper's; what they take from the Phi of Theorem 1 is derived in
+  theory_to_code.md, by the paper's own means.
 - The boundedness lemma's last step is wrong by up to sqrt(2): a_f |x_f - z_f| + a_s |v| is at most
   sqrt(2 (a_f^2 + a_s^2)) sqrt(V), not (a_f + a_s) sqrt(V); they are equal only for a_f = a_s.
 - With D coordinates, N epsilon and 4 N W_max become N D epsilon and 4 N D W_max, and sqrt(n), sqrt(N - n) in
@@ -40,6 +42,8 @@ class PaperConstants:
     pair: LyapunovPair
     first_dynamics: float = 0.0  # max eta_i over order 1
     second_dynamics: float = 0.0  # max eta_i over order 2
+    first_velocities: float = 0.0  # max nu_i over order 1
+    second_velocities: float = 0.0  # max nu_i over order 2
     dynamics_at_equilibrium: float = 0.0  # g >= |g_il(x*)|
     disturbance: float = 0.0  # d >= |d_il(t)|
 
@@ -121,6 +125,14 @@ def theorem_1_coefficients(c: PaperConstants, gains: Gains) -> Coefficients:
         - eta_f / 2.0
         - eta_s / 2.0
     )
+    nu_f = math.sqrt(c.first_players) * c.first_velocities
+    nu_s = math.sqrt(c.second_players) * c.second_velocities
+    for nu in (nu_f, nu_s):  # half a square of each of two products, where they are
+        actions -= 0.5 * (nu > 0.0)
+        estimates -= 0.5 * (nu > 0.0)
+    through_gradients = (N + 1) * (k2 * lipschitz) ** 2 / 2.0
+    velocities -= nu_s + 0.5 * (nu_f > 0.0) + through_gradients * nu_s**2
+    tracking -= nu_f**2 / 2.0 + through_gradients * nu_f**2
     return _present(c, Coefficients(actions, velocities, tracking, estimates))
 
 
