@@ -10,7 +10,6 @@ import argparse
 import json
 import os
 import platform
-import re
 import shutil
 import subprocess
 import sys
@@ -38,9 +37,10 @@ from .expression_games import (
     scaling_by_defaults,
     scaling_in_one_coordinate,
 )
+from .larger_games import cars, divers, seekers, with_eleven_neurons
 from .peers.core import Core
 from .peers.hybrid_model import Solution
-from .scaling_game import CENTERS, scaling_game
+from .scaling_game import scaling_game
 
 ROOT = Path(__file__).resolve().parents[2]
 PROGRAMS = ROOT / "build" / "bench" / "tests" / "bench"
@@ -462,6 +462,9 @@ GENERAL: dict[str, Callable[[], tuple[str, Functions]]] = {
         BY_HAND["electric_vehicles"](),
     ),
     "20 of the households": lambda: (fewer_households(20), two_hundred_households(20)),
+    "source seeking by 12, 11 neurons": lambda: seekers(12),
+    "10 underwater vehicles, 11 neurons": lambda: divers(10),
+    "15 electric vehicles": lambda: cars(15),
 }
 
 
@@ -492,12 +495,6 @@ def general(context: Context) -> Result:
             )
             print(f"  {name}, {linear_solver}: {rows[-1]['ratio']:.1f}", flush=True)
     return {"rows": rows}
-
-
-def with_eleven_neurons(name: str) -> str:
-    """An example game with as many centres as the paper's; it has fewer."""
-    text = (GAMES / f"{name}.toml").read_text(encoding="utf-8")
-    return re.sub(r"^centers = .*$", f"centers = {CENTERS}", text, flags=re.MULTILINE)
 
 
 PARTS: dict[str, Callable[[Context], Result]] = {
