@@ -149,9 +149,11 @@ def samples(
         pulled = W_rate / game.beta - S[:, :, np.newaxis] * e[:, np.newaxis]
         rates_of_parts = np.append(parts.imag / step, np.sum(columns.imag / step))
         local = NO_DYNAMICS if plain else dynamics_constants(own.parameters, distance, reach)
-        if moved:  # g_i has sum_j K_ij v_j besides, and e moves with it
-            K = 10.0 ** random.uniform(-1.0, 2.0) * random.standard_normal((N, N)) * ~first
-            moving = e * (K @ np.where(first[:, np.newaxis], 0.0, p))
+        if moved:  # g_i has sum_j K_ij v_j besides, and e moves with it, as far as it can or anyhow
+            v = np.where(first[:, np.newaxis], 0.0, p)
+            K = e @ v.T if random.uniform() < 0.7 else random.standard_normal((N, N)) * ~first
+            K *= 10.0 ** random.uniform(0.0, 5.0) / max(float(np.linalg.norm(K)), 1e-300)
+            moving = e * (K @ v)
             rates_of_parts[1] += moving[~first].sum()
             rates_of_parts[2] += moving[first].sum()
             local = replace(
