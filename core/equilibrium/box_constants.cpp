@@ -5,14 +5,14 @@
 #include <cmath>
 #include <functional>
 #include <limits>
-#include <memory>
-#include <optional>
 #include <random>
 #include <string>
 
+#include "equilibrium/dynamics_bounds.hpp"
 #include "equilibrium/equilibrium.hpp"
 #include "equilibrium/hessian_bounds.hpp"
-#include "families/polynomial_dynamics.hpp"
+#include "equilibrium/interval_matrix.hpp"
+#include "expression/enclosure.hpp"
 #include "families/sinusoidal_disturbance.hpp"
 
 namespace mixed_order_game {
@@ -27,10 +27,8 @@ constexpr int most_cut_sides = 40;  // that a quantity depends on, for the box t
 constexpr int most_parts = 20000;   // times sides
 constexpr int most_corners = 200;
 constexpr int most_points = 200;
-constexpr Real close = 0.005;  // of proof and sample, relative, from where on no more is cut
-
-/// Rounding of Eigen's eigenvalues and norms, relative to the matrix.
-constexpr Real rounding = 1e-13;
+constexpr Real close = 0.005;     // of proof and sample, relative, from where on no more is cut
+constexpr Real rounding = 1e-13;  // relative, of a few operations
 
 bool is_proof(const Enclosure::Found& found) {
   return found.definition == Enclosure::Definition::everywhere && found.kink == nullptr;
@@ -91,72 +89,6 @@ std::vector<Part> parts_of(const Box& whole, const std::function<Real(const Box&
     }
   }
   return parts;
-}
-
-/// An upper bound of the 2-norms of all matrices of D x n intervals.
-Real norm_bound(const std::vector<Interval>& rows, int D) {
-  const auto n = static_cast<Eigen::Index>(rows.size()) / D;
-  Matrix magnitude(D, n);
-  Matrix middle(D, n);
-  Matrix radius(D, n);
-  for (Eigen::Index l = 0; l < D; ++l) {
-    for (Eigen::Index k = 0; k < n; ++k) {
-      const Interval& entry = rows[at(static_cast<int>(l * n + k))];
-      magnitude(l, k) = entry.magnitude();
-      middle(l, k) = middle_of(entry);
-      radius(l, k) = std::max(entry.upper - middle(l, k), middle(l, k) - entry.lower);
-    }
-  }
-  if (!magnitude.allFinite()) return infinite;
-  const auto norm = [](const Matrix& matrix) {
-    return matrix.rows() == 1 ? matrix.norm()
-                              : std::sqrt(std::max(0.0, Eigen::SelfAdjointEigenSolver<Matrix>(
-                                                            matrix * matrix.transpose(), Eigen::EigenvaluesOnly)
-                                                            .eigenvalues()
-                                                            .maxCoeff()));
-  };
-  const Real least = D == 1 ? norm(magnitude) : std::min(norm(magnitude), norm(middle) + radius.norm());
-  return least * (1.0 + 10.0 * rounding);
-}
-
-/// Lower bound of the eigenvalues of the symmetric parts of all matrices of intervals. Such a matrix is at least the
-/// one in the middle, less on the diagonal its own radius and (R v)_k / v_k, R the radii beside the diagonal and v any
-/// positive vector: |2 r x_k x_p| <= r (v_p / v_k x_k^2 + v_k / v_p x_p^2). The first v balances all radii, which is as
-/// good as the norm of R; the next ones come closer to the sizes in the least eigenvector, where nothing is lost.
-Real least_eigenvalue(const std::vector<Interval>& entries, Eigen::Index n) {
-  constexpr int most_vectors = 6;
-  Matrix middle(n, n);
-  Matrix radius(n, n);
-  for (Eigen::Index p = 0; p < n; ++p) {
-    for (Eigen::Index k = 0; k <= p; ++k) {
-      const Interval one = entries[at(static_cast<int>(p * n + k))] + entries[at(static_cast<int>(k * n + p))];
-      middle(p, k) = middle(k, p) = 0.5 * middle_of(one);
-      radius(p, k) = radius(k, p) =
-          0.5 * std::max(one.upper - middle_of(one), middle_of(one) - one.lower) * (1.0 + rounding);
-    }
-  }
-  if (!middle.allFinite() || !radius.allFinite()) return -infinite;
-  const bool is_exact = radius.maxCoeff() == 0.0;
-  Eigen::VectorXd v = Eigen::VectorXd::Ones(n);
-  for (int sweep = 0; sweep < 20 && !is_exact; ++sweep) {
-    const Eigen::VectorXd next = radius * v;
-    v = next + Eigen::VectorXd::Constant(n, 1e-3 * next.maxCoeff());
-    v /= v.maxCoeff();
-  }
-  const Real scale = middle.cwiseAbs().rowwise().sum().maxCoeff();
-  Real least = -infinite;
-  for (int count = 0; count < (is_exact ? 1 : most_vectors); ++count) {
-    const Eigen::VectorXd less = (radius * v).cwiseQuotient(v) * (1.0 + static_cast<Real>(n) * rounding);
-    Matrix lower = middle;
-    lower.diagonal() -= less;
-    const Eigen::SelfAdjointEigenSolver<Matrix> solver(lower);
-    const Real here = solver.eigenvalues()(0) - rounding * static_cast<Real>(n) * (scale + less.maxCoeff());
-    if (count > 0 && here <= least + 1e-3 * std::abs(least)) return std::max(least, here);
-    least = here;
-    v = 0.5 * v / v.maxCoeff() +
-        0.5 * solver.eigenvectors().col(0).cwiseAbs() / solver.eigenvectors().col(0).cwiseAbs().maxCoeff();
-  }
-  return least;
 }
 
 Real norm_of(const Matrix& rows) {
@@ -282,159 +214,6 @@ JacobianBounds jacobian_bounds(const Shape& shape, const Box& box, const std::ve
   return bounds;
 }
 
-/// Encloses g_i and its derivatives along actions and velocities.
-class DynamicsRows {
- public:
-  DynamicsRows(const Parameters& parameters, const std::vector<ExpressionCost::Text>& texts) : parameters_(parameters) {
-    const Shape& shape = parameters.shape;
-    for (int i = 0; i < shape.players; ++i) {
-      const auto& graph = texts[at(shape.own_entry(i, 0))].graph;
-      players_.push_back(graph == nullptr ? nullptr : std::make_unique<OfPlayer>(OfPlayer{*graph, {}, {}}));
-      if (graph == nullptr) continue;
-      OfPlayer& player = *players_.back();
-      std::vector<int> along_actions;
-      for (int l = 0; l < shape.dimension; ++l) along_actions.push_back(texts[at(shape.own_entry(i, l))].node);
-      std::vector<int> along_velocities = along_actions;
-      for (int l = 0; l < shape.dimension; ++l) {
-        for (const auto& [leaf, derivative] : player.graph.derivatives(along_actions[at(l)])) {
-          if (leaf.kind == LeafKind::action) {
-            along_actions.push_back(derivative);
-            player.actions.place.emplace_back(l, leaf.index);
-          } else if (leaf.kind == LeafKind::velocity) {
-            along_velocities.push_back(derivative);
-            player.velocities.place.emplace_back(l, leaf.index);
-          }
-        }
-      }
-      player.actions.enclosure.emplace(player.graph, along_actions);
-      player.velocities.enclosure.emplace(player.graph, along_velocities);
-    }
-  }
-
-  [[nodiscard]] bool uses_velocities(int i) const {
-    return players_[at(i)] != nullptr && !players_[at(i)]->velocities.place.empty();
-  }
-
-  /// Sides of the boxes below that the rows depend on.
-  [[nodiscard]] std::vector<int> sides_along_actions(int i) const {
-    const Shape& shape = parameters_.shape;
-    std::vector<int> sides =
-        players_[at(i)] == nullptr ? std::vector<int>{} : sides_of(players_[at(i)]->actions, false);
-    for (const auto& [number, coefficient] : parameters_.dynamics->coefficients.terms(PolynomialDynamics::square)) {
-      const int entry = number / shape.players;
-      if (shape.player_of(entry) != i || coefficient == 0.0) continue;
-      sides.push_back(shape.entry(number % shape.players, shape.coordinate_of(entry)));
-    }
-    std::sort(sides.begin(), sides.end());
-    sides.erase(std::unique(sides.begin(), sides.end()), sides.end());
-    return sides;
-  }
-  [[nodiscard]] std::vector<int> sides_along_velocities(int i) const {
-    return uses_velocities(i) ? sides_of(players_[at(i)]->velocities, true) : std::vector<int>{};
-  }
-
-  /// While all are at rest: g_il at values[l], d g_il / d x_k at rows[l n + k]. The box has n sides.
-  Enclosure::Found along_actions(int i, const Box& box, std::vector<Interval>& rows,
-                                 std::vector<Interval>& values) const {
-    const Shape& shape = parameters_.shape;
-    const Coefficients& coefficients = parameters_.dynamics->coefficients;
-    const std::size_t n = box.size();
-    rows.assign(at(shape.dimension) * n, Interval::of(0.0));
-    values.assign(at(shape.dimension), Interval::of(0.0));
-    Enclosure::Found found;
-    if (const OfPlayer* player = players_[at(i)].get(); player != nullptr) {
-      found = fill(player->actions, box, rows, values);
-    }
-    const auto add_terms = [&](int number, const auto& value, const auto& slope) {
-      for (int l = 0; l < shape.dimension; ++l) {
-        const int first = shape.entry(i, l) * shape.players;
-        const auto& terms = coefficients.terms(number);
-        for (auto term = terms.lower_bound(first); term != terms.end() && term->first < first + shape.players; ++term) {
-          const int column = shape.entry(term->first - first, l);
-          const Interval& x = box[at(column)];
-          values[at(l)] = values[at(l)] + Interval::of(term->second) * value(x);
-          rows[at(l) * n + at(column)] = rows[at(l) * n + at(column)] + Interval::of(term->second) * slope(x);
-        }
-      }
-    };
-    add_terms(
-        PolynomialDynamics::linear, [](const Interval& x) { return x; },
-        [](const Interval&) { return Interval::of(1.0); });
-    add_terms(
-        PolynomialDynamics::square, [](const Interval& x) { return squared(x); },
-        [](const Interval& x) { return Interval::of(2.0) * x; });
-    const Interval gain = Interval::of(coefficients[PolynomialDynamics::gain][at(i)]);
-    for (Interval& each : rows) each = gain * each;
-    for (Interval& each : values) each = gain * each;
-    return found;
-  }
-
-  /// d g_il / d v_k at rows[l n + k]. The box has 2 n sides, those of the actions, then those of the velocities.
-  Enclosure::Found along_velocities(int i, const Box& box, std::vector<Interval>& rows) const {
-    const Shape& shape = parameters_.shape;
-    rows.assign(at(shape.dimension) * at(shape.actions()), Interval::of(0.0));
-    if (!uses_velocities(i)) return {};
-    std::vector<Interval> values(at(shape.dimension));
-    const Enclosure::Found found = fill(players_[at(i)]->velocities, box, rows, values);
-    const Interval gain = Interval::of(parameters_.dynamics->coefficients[PolynomialDynamics::gain][at(i)]);
-    for (Interval& each : rows) each = gain * each;
-    return found;
-  }
-
- private:
-  /// Some derivatives of g_i, after its values.
-  struct Derivatives {
-    std::optional<Enclosure> enclosure;
-    std::vector<std::pair<int, int>> place;  // l and column
-  };
-  struct OfPlayer {
-    ExpressionGraph graph;
-    Derivatives actions;
-    Derivatives velocities;
-  };
-
-  [[nodiscard]] std::vector<int> sides_of(const Derivatives& derivatives, bool with_velocities) const {
-    std::vector<int> sides;
-    for (const Leaf& leaf : derivatives.enclosure->leaves()) {
-      if (leaf.kind == LeafKind::action) sides.push_back(leaf.index);
-      if (leaf.kind == LeafKind::velocity && with_velocities) {
-        sides.push_back(parameters_.shape.actions() + leaf.index);
-      }
-    }
-    return sides;
-  }
-
-  /// Velocities that the box has no sides for are 0.
-  Enclosure::Found fill(const Derivatives& derivatives, const Box& box, std::vector<Interval>& rows,
-                        std::vector<Interval>& values) const {
-    const std::size_t n = at(parameters_.shape.actions());
-    std::vector<Interval> of_nodes;
-    const Enclosure::Found found = derivatives.enclosure->evaluate(
-        [&](const Leaf& leaf) {
-          switch (leaf.kind) {
-            case LeafKind::action:
-              return box[at(leaf.index)];
-            case LeafKind::velocity:
-              return box.size() > n ? box[n + at(leaf.index)] : Interval::of(0.0);
-            case LeafKind::parameter:
-              return Interval::of(parameters_.dynamics->coefficients.named[at(leaf.index)]);
-            default:
-              return Interval{};
-          }
-        },
-        of_nodes);
-    std::copy_n(of_nodes.begin(), values.size(), values.begin());
-    for (std::size_t k = 0; k < derivatives.place.size(); ++k) {
-      const auto [l, column] = derivatives.place[k];
-      rows[at(l) * n + at(column)] = of_nodes[values.size() + k];
-    }
-    return found;
-  }
-
-  const Parameters& parameters_;
-  std::vector<std::unique_ptr<OfPlayer>> players_;  // null without an expression
-};
-
 /// |d_il(t)| for all t >= 0.
 Real disturbance_size(const Parameters& parameters, const ExpressionCost::Text& text, int entry) {
   const Coefficients& coefficients = parameters.disturbance->coefficients;
@@ -472,7 +251,8 @@ Box with_speeds(const Box& box, const Shape& shape, Real speed) {
 }
 
 /// Of g_i along velocities.
-JacobianBounds velocity_bounds(const Parameters& parameters, const DynamicsRows& dynamics, const Box& box, Real speed) {
+JacobianBounds velocity_bounds(const Parameters& parameters, const DynamicsBounds& dynamics, const Box& box,
+                               Real speed) {
   const Shape& shape = parameters.shape;
   const Box both = with_speeds(box, shape, speed);
   std::vector<Real> sampled(at(shape.players), 0.0);
@@ -537,7 +317,7 @@ Real least_by_blocks(const Shape& shape, const HessianBounds& hessian, const Box
       }
     }
   }
-  return least_eigenvalue(entries, static_cast<Eigen::Index>(n));
+  return least_eigenvalue(entries, shape.actions());
 }
 
 }  // namespace
@@ -547,7 +327,7 @@ BoxConstants box_constants(const Parameters& parameters, const GameExpressions& 
   const Shape& shape = parameters.shape;
   const std::size_t n = box.size();
   const HessianBounds hessian(parameters, expressions.costs);
-  const DynamicsRows dynamics(parameters, expressions.dynamics);
+  const DynamicsBounds dynamics(parameters, expressions.dynamics);
   BoxConstants constants;
 
   // samples
@@ -598,7 +378,7 @@ BoxConstants box_constants(const Parameters& parameters, const GameExpressions& 
                     jacobian.begin() + static_cast<std::ptrdiff_t>(at(shape.entry(i, l)) * n));
       }
     }
-    return -least_eigenvalue(jacobian, static_cast<Eigen::Index>(n));
+    return -least_eigenvalue(jacobian, shape.actions());
   };
   Real proved = -infinite;
   std::vector<int> sides;

@@ -1,9 +1,10 @@
 #include "equilibrium/hessian_bounds.hpp"
 
-#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 #include <deque>
+
+#include "equilibrium/interval_matrix.hpp"
 
 namespace mixed_order_game {
 
@@ -15,14 +16,6 @@ Real middle_of(const Interval& side) {
   if (std::isinf(side.upper)) return side.lower < 0.0 ? 0.0 : 2.0 * side.lower + 1.0;
   if (std::isinf(side.lower)) return side.upper > 0.0 ? 0.0 : 2.0 * side.upper - 1.0;
   return 0.5 * side.lower + 0.5 * side.upper;
-}
-
-std::vector<int> actions_of(const Enclosure& enclosure) {
-  std::vector<int> actions;
-  for (const Leaf& leaf : enclosure.leaves()) {
-    if (leaf.kind == LeafKind::action) actions.push_back(leaf.index);
-  }
-  return actions;
 }
 
 }  // namespace
@@ -56,8 +49,18 @@ HessianBounds::HessianBounds(const Parameters& parameters, const std::vector<Exp
         if (shape.player_of(along.index) == i) add(second, l, along.index, own, player.own);
       }
     }
-    player.own.enclosure.emplace(player.graph, own);
-    player.all.enclosure.emplace(player.graph, all);
+    const auto make = [&](const std::vector<int>& nodes, Derivatives& derivatives) {
+      std::vector<int> second;
+      for (std::size_t k = 0; k < nodes.size(); ++k) {
+        if (derivatives.place[k].first >= 0) second.push_back(nodes[k]);
+      }
+      for (const Leaf& leaf : Enclosure(player.graph, second).leaves()) {
+        if (leaf.kind == LeafKind::action) derivatives.actions.push_back(leaf.index);
+      }
+      derivatives.enclosure.emplace(player.graph, nodes);
+    };
+    make(own, player.own);
+    make(all, player.all);
   }
 }
 
@@ -81,11 +84,11 @@ Enclosure::Found HessianBounds::own_rows(int i, const std::vector<Interval>& box
 }
 
 std::vector<int> HessianBounds::actions_of_rows(int i) const {
-  return players_[at(i)] == nullptr ? std::vector<int>{} : actions_of(*players_[at(i)]->all.enclosure);
+  return players_[at(i)] == nullptr ? std::vector<int>{} : players_[at(i)]->all.actions;
 }
 
 std::vector<int> HessianBounds::actions_of_own_rows(int i) const {
-  return players_[at(i)] == nullptr ? std::vector<int>{} : actions_of(*players_[at(i)]->own.enclosure);
+  return players_[at(i)] == nullptr ? std::vector<int>{} : players_[at(i)]->own.actions;
 }
 
 Enclosure::Found HessianBounds::enclose(int i, Columns columns, const std::vector<Interval>& box,
@@ -132,20 +135,11 @@ bool HessianBounds::is_positive_semidefinite(int i, const std::vector<Interval>&
     is_dominant = is_dominant && rest.lower >= 0.0;
   }
   if (is_dominant || D == 1) return is_dominant;
-  // by the matrix in the middle: what the others differ by moves no eigenvalue by more than its norm
-  Eigen::MatrixXd middle(D, D);
-  Eigen::MatrixXd radius(D, D);
+  std::vector<Interval> own;
   for (int l = 0; l < D; ++l) {
-    for (int h = 0; h < D; ++h) {
-      middle(l, h) = 0.25 * (entry(l, h).lower + entry(l, h).upper + entry(h, l).lower + entry(h, l).upper);
-      radius(l, h) = std::max({entry(l, h).upper - middle(l, h), middle(l, h) - entry(l, h).lower,
-                               entry(h, l).upper - middle(l, h), middle(l, h) - entry(h, l).lower});
-    }
+    for (int h = 0; h < D; ++h) own.push_back(entry(l, h));
   }
-  if (!middle.allFinite() || !radius.allFinite()) return false;
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(middle, Eigen::EigenvaluesOnly);
-  const Real rounding = 1e-12 * (middle.cwiseAbs().rowwise().sum().maxCoeff());
-  return solver.eigenvalues()(0) - rounding >= (1.0 + 1e-12) * radius.rowwise().sum().maxCoeff();
+  return least_eigenvalue(own, D) >= 0.0;
 }
 
 bool HessianBounds::is_convex(int i, const std::vector<Real>& x, Real distance) const {

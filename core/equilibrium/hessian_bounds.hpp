@@ -39,6 +39,7 @@ class HessianBounds {
   struct Derivatives {
     std::optional<Enclosure> enclosure;
     std::vector<std::pair<int, int>> place;  // l and column; l is -1 for those that come before
+    std::vector<int> actions;                // that the second derivatives depend on
   };
   struct OfPlayer {
     ExpressionGraph graph;
