@@ -99,9 +99,8 @@ Interval exponential(const Interval& a) {
   return rising(a, [](Real x) { return std::exp(x); }, 0.0);
 }
 
+/// Of an interval that has 0 at most as one of its ends.
 Interval inverse(const Interval& a) {
-  if (a.lower == 0.0 && a.upper == 0.0) return Interval::none();
-  if (a.lower < 0.0 && a.upper > 0.0) return {};
   const Real lower = a.upper == 0.0 ? -infinite : quotient(1.0, a.upper).lower;
   const Real upper = a.lower == 0.0 ? infinite : quotient(1.0, a.lower).upper;
   return {lower, upper};

@@ -3,14 +3,19 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <utility>
+#include <vector>
 
 namespace mixed_order_game {
 namespace {
 
 using Vector3 = Eigen::Vector3d;
 using Matrix3 = Eigen::Matrix3d;
+using Vector = Eigen::VectorXd;
+using Matrix = Eigen::MatrixXd;
 
 /// Prothero and Robinson's problem beside a nonlinear oscillator that it drives: y_1' = -stiffness (y_1 - sin t) + cos
 /// t with y_1 = sin t, and y_2' = y_3, y_3' = -sin y_2 + y_1.
@@ -72,6 +77,126 @@ TEST(RosenbrockMethod, IsOfOrderFiveWithAnEstimateOfOrderFour) {
   EXPECT_GT(std::log2((coarse - exact).norm() / (fine - exact).norm()), 4.7);
   EXPECT_GT(std::log2(coarse_estimate / fine_estimate), 4.7);  // of one step: one order more
   EXPECT_LT((fine - exact).norm(), 8 * fine_estimate);
+}
+
+/// Rates that are products of components, one for each rooted tree of up to five nodes: from 0 on, component k is
+/// c_k t^n_k with n_k nodes. The time t is a component, too, or is given as such in factors where it stands alone.
+class Trees final : public RosenbrockSystem {
+ public:
+  static constexpr int size = 17;
+
+  explicit Trees(bool is_timed) : is_timed_(is_timed) {}
+
+  static Vector exact() {
+    Vector coefficients(size);
+    for (int k = 0; k < size; ++k) {
+      Real product = 1.0;
+      for (const int factor : factors()[at(k)]) product *= coefficients[factor];
+      coefficients[k] = product / nodes(k);
+    }
+    return coefficients;
+  }
+  static int nodes(int k) {
+    int count = 1;
+    for (const int factor : factors()[at(k)]) count += nodes(factor);
+    return count;
+  }
+
+  int rate(Real t, const Real* y, Real* rate) noexcept override {
+    for (int k = 0; k < size; ++k) {
+      rate[k] = 1.0;
+      for (const int factor : factors()[at(k)]) rate[k] *= is_time(k, factor) ? t : y[factor];
+    }
+    return 0;
+  }
+  int newton_matrix(const Real* y, Real gamma) noexcept override {
+    Matrix J = Matrix::Zero(size, size);
+    for (int k = 0; k < size; ++k) {
+      const std::vector<int>& all = factors()[at(k)];
+      for (std::size_t i = 0; i < all.size(); ++i) {
+        if (is_time(k, all[i])) continue;
+        Real product = 1.0;
+        for (std::size_t j = 0; j < all.size(); ++j) {
+          if (j != i) product *= y[all[j]];
+        }
+        J(k, all[i]) += product;
+      }
+    }
+    factors_ = (Matrix::Identity(size, size) - gamma * J).partialPivLu();
+    return 0;
+  }
+  int solve(Real* b) noexcept override {
+    Eigen::Map<Vector> rhs(b, size);
+    rhs = factors_.solve(rhs).eval();
+    return 0;
+  }
+
+ private:
+  /// Of the tree's root: the trees that hang on it.
+  static const std::vector<std::vector<int>>& factors() {
+    static const std::vector<std::vector<int>> trees{{},     {0}, {0, 0},       {1},       {0, 0, 0}, {0, 1},
+                                                     {2},    {3}, {0, 0, 0, 0}, {0, 0, 1}, {1, 1},    {0, 2},
+                                                     {0, 3}, {4}, {5},          {6},       {7}};
+    return trees;
+  }
+  [[nodiscard]] bool is_time(int k, int factor) const {
+    const std::vector<int>& all = factors()[at(k)];
+    return is_timed_ && factor == 0 && std::count(all.begin(), all.end(), 0) == 1;
+  }
+
+  bool is_timed_;
+  Eigen::PartialPivLU<Matrix> factors_;
+};
+
+TEST(RosenbrockMethod, MeetsEveryOrderConditionToTheLastDigits) {
+  for (const bool is_timed : {false, true}) {
+    Trees trees(is_timed);
+    RosenbrockMethod method(trees, Trees::size);
+    const Vector start = Vector::Zero(Trees::size);
+    const Vector exact = Trees::exact();
+    Vector next(Trees::size);
+    for (int k = 0; k < Trees::size; ++k) {
+      Vector weight = Vector::Zero(Trees::size);
+      weight[k] = 1.0;
+      Real estimate = 0.0;
+      ASSERT_EQ(method.step(0.0, 1.0, 0.0, start.data(), weight.data(), next.data(), estimate), 0);
+      EXPECT_NEAR(next[k], exact[k], 1e-13) << "tree " << k << (is_timed ? ", by time" : "");
+      if (Trees::nodes(k) < 5) {
+        EXPECT_NEAR(estimate, 0.0, 1e-13) << "tree " << k << (is_timed ? ", by time" : "");
+      }
+    }
+  }
+}
+
+TEST(RosenbrockMethod, EstimatesByTheRootMeanSquareOfTheLastStage) {
+  /// Moves in the last stage alone.
+  class Late final : public RosenbrockSystem {
+   public:
+    Real gamma = 0.0;
+    int rate(Real /*t*/, const Real* /*y*/, Real* rate) noexcept override {
+      const bool is_last = ++calls_ == 9;  // two at the beginning, seven of stages
+      rate[0] = is_last ? 3.0 : 0.0;
+      rate[1] = is_last ? -5.0 : 0.0;
+      return 0;
+    }
+    int newton_matrix(const Real* /*y*/, Real gamma_of_step) noexcept override {
+      gamma = gamma_of_step;
+      return 0;
+    }
+    int solve(Real* /*b*/) noexcept override { return 0; }
+
+   private:
+    int calls_ = 0;
+  } late;
+  RosenbrockMethod method(late, 2);
+  const std::array<Real, 2> state{1.0, 1.0};
+  const std::array<Real, 2> weight{2.0, 0.5};
+  std::array<Real, 2> next{};
+  Real error = 0.0;
+  ASSERT_EQ(method.step(0.0, 0.1, 0.0, state.data(), weight.data(), next.data(), error), 0);
+  EXPECT_DOUBLE_EQ(next[0], 1.0 + 3.0 * late.gamma);
+  EXPECT_DOUBLE_EQ(next[1], 1.0 - 5.0 * late.gamma);
+  EXPECT_DOUBLE_EQ(error, late.gamma * std::sqrt((6.0 * 6.0 + 2.5 * 2.5) / 2.0));
 }
 
 TEST(RosenbrockMethod, StepsOverWhatIsStiff) {
