@@ -1,6 +1,7 @@
 """Players that talk once a period: our master against exact propagation, and the study."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -59,6 +60,18 @@ def test_the_longest_period_is_where_the_map_turns_unstable() -> None:
     assert np.sort(np.exp(0.05 * exact.real)) == pytest.approx(
         np.sort(np.abs(np.linalg.eigvals(period_map(parameters, ALL, 0.05)))), abs=1e-9
     )
+
+
+def test_the_longest_period_goes_with_the_loops_own_times_and_is_zero_where_that_is_unstable() -> None:
+    parameters = game_parameters(mog.read_model("five_vehicles"))
+    apart = [[number] for number in range(1, 6)]
+    unstable = replace(parameters, k1=5.0, k3=5.0, k4=5.0)
+    assert np.linalg.eigvals(linear_loop(unstable)).real.max() > 0.0
+    assert longest_period(unstable, apart) == 0.0
+    # of players of order 1 alone, all rates of the loop are in proportion to the gains
+    first = replace(parameters, order=np.ones(5, dtype=int), k1=10.0)
+    faster = replace(first, k1=1e4, k2=1e3, k3=5e4)
+    assert longest_period(faster, apart) == pytest.approx(1e-3 * longest_period(first, apart), rel=1e-3)
 
 
 def test_the_study_tells_which_period_is_survived(tmp_path: Path) -> None:

@@ -32,9 +32,7 @@ def period_map(game: GameParameters, groups: Sequence[Collection[int]], period: 
         both = np.zeros((2 * n, 2 * n))
         both[:n, :n], both[:n, n:] = matrix[np.ix_(own, own)], np.eye(n)
         power = expm(both * period)
-        heard = matrix[own]
-        heard[:, own] = 0.0
-        found[own] = power[:n, n:] @ heard
+        found[own] = power[:n, n:] @ matrix[own]
         found[np.ix_(own, own)] = power[:n, :n]
     return found
 
