@@ -10,6 +10,7 @@
 #include "equilibrium/equilibrium.hpp"
 #include "errors.hpp"
 #include "game/game.hpp"
+#include "larger.hpp"
 #include "loop_matrix.hpp"
 #include "random_game.hpp"
 
@@ -75,7 +76,8 @@ TEST(Integrator, ReachesTheNeighbourhoodOfThePapersEquilibrium) {
     const Real t = 0.02 * k;
     run.integrator.advance(t);
     EXPECT_LE(run.largest_norm2(), 500.0 * (1.0 + 1e-9));
-    for (int p = 0; p < 10 && t >= 16.0; ++p) largest = std::max(largest, std::abs(run.integrator.state()[p] + 0.5));
+    for (int p = 0; p < 10 && t >= 16.0; ++p)
+      largest = testing::larger(largest, std::abs(run.integrator.state()[p] + 0.5));
   }
   EXPECT_NEAR(largest, 0.00122, 0.000005);
   EXPECT_EQ(run.integrator.statistics().events, 22);
@@ -202,7 +204,7 @@ TEST(Integrator, ErrorFallsWithTheTolerance) {
     run.integrator.start(0.0, {tolerance, 0.01 * tolerance});
     run.integrator.advance(0.7);
     Real error = 0.0;
-    for (int p = 0; p < 20; ++p) error = std::max(error, std::abs(run.state()[at(p)] - exact.state()[at(p)]));
+    for (int p = 0; p < 20; ++p) error = testing::larger(error, std::abs(run.state()[at(p)] - exact.state()[at(p)]));
     EXPECT_LT(error, previous / 5.0) << tolerance;
     previous = error;
   }

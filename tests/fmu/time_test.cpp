@@ -3,6 +3,7 @@
 #include <limits>
 
 #include "angle_reduction.hpp"
+#include "larger.hpp"
 #include "slave.hpp"
 
 namespace {
@@ -17,7 +18,8 @@ constexpr const char* outputs[] = {"x[1,1]", "x[1,2]", "x[2,1]", "x[2,2]", "x[3,
 
 double largest_difference(Slave& a, Slave& b) {
   double largest = 0.0;
-  for (const char* name : outputs) largest = std::max(largest, std::fabs(a.get(name) - b.get(name)));
+  for (const char* name : outputs)
+    largest = mixed_order_game::testing::larger(largest, std::fabs(a.get(name) - b.get(name)));
   return largest;
 }
 
