@@ -5,7 +5,6 @@
 #include <pugixml.hpp>
 
 #include "importer.hpp"
-#include "larger.hpp"
 #include "model_description.hpp"
 
 using namespace mixed_order_game;
@@ -151,8 +150,7 @@ std::vector<double> stretch(Slave& slave, int k) {
 
 double largest_difference(Slave& a, Slave& b) {
   double largest = 0.0;
-  for (const std::string& name : outputs(a))
-    largest = mixed_order_game::testing::larger(largest, std::fabs(a.get(name) - b.get(name)));
+  for (const std::string& name : outputs(a)) largest = std::max(largest, std::fabs(a.get(name) - b.get(name)));
   return largest;
 }
 

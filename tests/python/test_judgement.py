@@ -57,6 +57,35 @@ def test_every_communication_step_tells_what_fine_samples_do(fmu_of: FmuOf, jump
         assert runs[0][figure][-1] == pytest.approx(runs[2][figure][-1], rel=1e-7)
 
 
+def test_a_run_settles_where_a_jump_of_the_equilibrium_ends_what_another_began(fmu_of: FmuOf) -> None:
+    away, back = {"cost_linear[1,1]": 40.0}, {"cost_linear[1,1]": 1.21}
+    with Simulator(fmu_of("two_scalar_players")) as simulator:
+        for step in (0.02, STOP):
+            result = simulator.run(
+                stop_time=STOP,
+                step=step,
+                start_values={"settling_band": 4.0},
+                changes={0.3: away, 0.32: back},
+                outputs=["x"],
+            )
+            assert result["settling_time"][-1] == pytest.approx(0.32, abs=1e-12)
+            assert result["settled"][-1] == 1.0
+
+
+def test_a_run_settles_where_an_error_was_last_outside_within_a_step(fmu: Path) -> None:
+    """The band ends a little below the error's largest peak of the last period of the disturbances."""
+    with Simulator(fmu) as simulator:
+        found = simulator.run(step=0.002, outputs=["nash_error"])
+        late = np.flatnonzero(found.time > 17.5)
+        top = late[np.argmax(found.nash_error[late])]
+        around = slice(top - 1, top + 2)
+        parabola = np.polyfit(found.time[around] - found.time[top], found.nash_error[around], 2)
+        band = (1.0 - 1e-7) * float(found.nash_error[top])
+        leaves = found.time[top] + np.roots(parabola - [0.0, 0.0, band]).max()
+        settled = simulator.run(step=20.0, start_values={"settling_band": band}, outputs=["nash_error"])
+    assert settled["settling_time"][-1] == pytest.approx(leaves, abs=1e-4)
+
+
 def test_samples_are_never_beyond(fmu: Path) -> None:
     result = run(fmu, stop_time=4.0, start_values={"judge_from": 0.0})
     largest_control = np.abs(result.u).max(axis=(1, 2))

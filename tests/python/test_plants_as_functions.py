@@ -5,6 +5,7 @@
 import json
 import math
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ from typer.testing import CliRunner
 import mixed_order_game as mog
 from mixed_order_game.cli.app import app
 from mixed_order_game.errors import ExperimentError, GameError, ModelError, SimulationError, VariableError
+from mixed_order_game.fmu.plants import PlantFunctions
 
 Floats = NDArray[np.float64]
 REFERENCES = Path(__file__).resolve().parents[1] / "reference"
@@ -71,6 +73,55 @@ def test_players_of_both_orders_at_once_with_their_starts(simulator: mog.Simulat
     assert result.x[0, 2].tolist() == [2.0, 8.0]
     assert result.v[0, 4].tolist() == [0.5, 0.5]
     assert result.changed.keys() >= {"x[3,1]", "x0[1,1]", "v[5,2]", "v0[4,1]"}
+
+
+def test_players_keep_gains_of_their_own() -> None:
+    game = mog.Game("five_vehicles")
+    game.player(3)["gains"] = {"k1": 7.0}
+    game.player(4)["gains"] = {"k4": 30.0, "delta": 5.0, "epsilon": 0.02}
+    plants = {number: vehicle(number) for number in (3, 4, 5)}
+    result = mog.run(game, plant=plants, stop_time=0.3, step=0.05)
+    whole = mog.run(game, stop_time=0.3, step=0.05)
+    assert np.abs(result.x - whole.x).max() < 2e-4
+
+
+def test_the_fmu_is_led_along_the_predicted_and_along_the_found_path(
+    simulator: mog.Simulator, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where both end the FMU holds p as it was predicted or found, and x as the integral of p."""
+    ends = {"predicted": 0, "found": 0}
+    close = partial(np.testing.assert_allclose, rtol=1e-10, atol=1e-10)
+    solved, accept = PlantFunctions._solved, PlantFunctions._accept
+
+    def held(plants: PlantFunctions) -> tuple[Floats, Floats]:
+        p = plants._p_inputs.read(plants._slave).reshape(plants._shape)
+        return p, plants._x_inputs.read(plants._slave).reshape(-1, plants._shape[1])
+
+    def checked_solved(self: PlantFunctions, k: int, time: float, guess: Floats, bound: Floats) -> Floats:
+        (p, x), (begin, p_before, x_before) = held(self), self._past[0]
+        close(p[k], guess)
+        if len(self._past) > 1:  # the cubic with the rate of the last point, through that before and p
+            points = np.array([self._past[1][0], time]) - begin
+            rest = np.array([self._past[1][1], p]) - p_before - points[:, None, None] * self._rate
+            square = np.linalg.solve(points[:, None] ** [2, 3], rest.reshape(2, -1))[0].reshape(p.shape)
+            h = time - begin
+            path = h * p_before + h**2 / 2.0 * self._rate + h**3 / 3.0 * square
+            np.testing.assert_allclose(x, x_before + path[self._second], rtol=0.0, atol=1e-11)
+            ends["predicted"] += 1
+        return solved(self, k, time, guess, bound)
+
+    def checked_accept(self: PlantFunctions, time: float, after: float) -> None:
+        accept(self, time, after)
+        (p, x), (_, p_found, x_found) = held(self), self._past[0]
+        close(p, p_found)
+        close(x, x_found)
+        ends["found"] += 1
+
+    monkeypatch.setattr(PlantFunctions, "_solved", checked_solved)
+    monkeypatch.setattr(PlantFunctions, "_accept", checked_accept)
+    simulator.run(plant={number: vehicle(number) for number in (3, 4)}, stop_time=0.05, step=0.05)
+    assert ends["predicted"] > 0
+    assert ends["found"] > 20
 
 
 def test_a_push_in_the_plant_is_met(simulator: mog.Simulator) -> None:
