@@ -36,13 +36,22 @@ Standing CoSimulation::standing() const {
 Change CoSimulation::change_to(std::span<const Real> settings, std::size_t parameters, std::size_t inputs) const {
   const std::span<const Real> acting = acting_;
   if (!same_bits(settings.first(parameters), acting.first(parameters))) return Change::parameters;
-  return same_bits(settings.last(inputs), acting.last(inputs)) ? Change::none : Change::input;
+  return change_to(settings.last(inputs));
 }
 
-void CoSimulation::settings_act(Change change, std::vector<Real> acting, std::span<const Real> x_star) {
-  if (change == Change::parameters) integrator_.set_equilibrium(x_star);
+Change CoSimulation::change_to(std::span<const Real> inputs) const {
+  return same_bits(inputs, std::span(acting_).last(inputs.size())) ? Change::none : Change::input;
+}
+
+void CoSimulation::settings_act(std::vector<Real> acting, std::span<const Real> x_star) {
+  integrator_.set_equilibrium(x_star);
   acting_ = std::move(acting);
-  integrator_.restart(change == Change::parameters);
+  integrator_.restart(true);
+}
+
+void CoSimulation::inputs_act(std::span<const Real> inputs) {
+  std::ranges::copy(inputs, std::span(acting_).last(inputs.size()).begin());
+  integrator_.restart(false);
 }
 
 Real CoSimulation::end_of_step(Real t, Real h, std::optional<Real> stop_time) const {

@@ -29,10 +29,14 @@ class CoSimulation {
 
   /// What differs, bit for bit, from the settings that act: numbers of parameters come first, of inputs last.
   [[nodiscard]] Change change_to(std::span<const Real> settings, std::size_t parameters, std::size_t inputs) const;
+  /// The same where nothing but inputs was touched.
+  [[nodiscard]] Change change_to(std::span<const Real> inputs) const;
   /// The evaluation is about to take over changed settings.
   void prepare_change() { integrator_.prepare_change(); }
   /// The evaluation has taken them over.
-  void settings_act(Change change, std::vector<Real> acting, std::span<const Real> x_star);
+  void settings_act(std::vector<Real> acting, std::span<const Real> x_star);
+  /// The evaluation has taken over these inputs alone.
+  void inputs_act(std::span<const Real> inputs);
 
   /// Where a step from t by h ends; throws Error when it is none that can be taken.
   [[nodiscard]] Real end_of_step(Real t, Real h, std::optional<Real> stop_time) const;

@@ -412,7 +412,8 @@ void Instance::do_step(Real t, Real h) {
   const Real end = co_simulation_->end_of_step(t, h, experiment_.stop_time);
   Change change = Change::none;
   std::vector<Real> numbers;
-  if (touched_ != Change::none) {
+  if (touched_ == Change::input) change = co_simulation_->change_to(settings_.inputs.numbers());
+  if (touched_ == Change::parameters) {
     numbers = model_.variables.save(settings_);
     change = co_simulation_->change_to(numbers, model_.variables.saved_parameters(), model_.variables.saved_inputs());
     if (change == Change::parameters) check_settings();
@@ -421,9 +422,14 @@ void Instance::do_step(Real t, Real h) {
   evaluation_.moved();
   try {
     if (change != Change::none) co_simulation_->prepare_change();
-    if (change == Change::parameters) evaluation_.act(settings_);
-    if (change == Change::input) evaluation_.act(settings_.inputs);
-    if (change != Change::none) co_simulation_->settings_act(change, std::move(numbers), evaluation_.x_star());
+    if (change == Change::parameters) {
+      evaluation_.act(settings_);
+      co_simulation_->settings_act(std::move(numbers), evaluation_.x_star());
+    }
+    if (change == Change::input) {
+      evaluation_.act(settings_.inputs);
+      co_simulation_->inputs_act(settings_.inputs.numbers());
+    }
     co_simulation_->advance(end);
   } catch (const std::exception& error) {
     phase_ = Phase::error;
