@@ -5,6 +5,12 @@ inline void exponentiate_and_repeat(int rows, int dimension, int neurons, double
   // the scratch is long enough for whole vectors
   const int whole = (rows * neurons + vector_length - 1) / vector_length * vector_length;
   exponential(whole, exponent, exponent);
+  if (rows == 1) {
+    for (int m = 0; m < neurons; ++m) {
+      for (int l = 0; l < dimension; ++l) activation[m * dimension + l] = exponent[m];
+    }
+    return;
+  }
   with_width(rows, [=](auto width) {
     using Width = decltype(width);
     for (int m = 0; m < neurons; ++m) {
@@ -23,18 +29,26 @@ void activations_diagonal(int rows, int n, int dimension, int neurons, const dou
   double* sum = exponent + rows * neurons + vector_length;
   double* squares = sum + rows;
   for (int i = 0; i < rows; ++i) moments(n, y + i * n, sum + i, squares + i);
-  with_width(rows, [=](auto lanes) {
-    using Width = decltype(lanes);
-    for (int m = 0; m < neurons; ++m) {
-      // -sum (y - c)^2 / rho^2 = (2 c sum y - sum y^2 - n c^2) / rho^2
-      const double* center = centers + m * rows;
-      set_row_by(lanes, rows, exponent + m * rows, [=](auto, Index i) {
-        const Width c = load_as<Width>(center + i);
-        return (((2.0 * c) * load_as<Width>(sum + i) - load_as<Width>(squares + i)) - (count * c) * c) *
-               load_as<Width>(sharpness + i);
-      });
-    }
-  });
+  // -sum (y - c)^2 / rho^2 = (2 c sum y - sum y^2 - n c^2) / rho^2
+  const auto exponent_of = [=](const auto& c, const auto& sum_y, const auto& sum_y2, const auto& inverse_rho2) {
+    return (((2.0 * c) * sum_y - sum_y2) - (count * c) * c) * inverse_rho2;
+  };
+  if (rows == 1) {  // along the neurons
+    set_row(neurons, exponent, [=](auto width, Index m) {
+      return exponent_of(load_as<decltype(width)>(centers + m), *sum, *squares, *sharpness);
+    });
+  } else {
+    with_width(rows, [=](auto lanes) {
+      using Width = decltype(lanes);
+      for (int m = 0; m < neurons; ++m) {
+        const double* center = centers + m * rows;
+        set_row_by(lanes, rows, exponent + m * rows, [=](auto, Index i) {
+          return exponent_of(load_as<Width>(center + i), load_as<Width>(sum + i), load_as<Width>(squares + i),
+                             load_as<Width>(sharpness + i));
+        });
+      }
+    });
+  }
   exponentiate_and_repeat(rows, dimension, neurons, exponent, activation);
 }
 

@@ -73,12 +73,15 @@ void add_correction(std::int64_t n, double scale_of, const double* delta, const 
   });
 }
 
-void combine_stages(std::int64_t n, int count, const double* a, const double* c, const double* const* stage,
-                    const double* state, double b, const double* rate, double* point, double* rhs) {
+/// Where their number is known, the coefficients stay in registers.
+template <int count>
+inline void combine_stages_of(Index n, const double* a, const double* c, const double* const* stage,
+                              const double* state, double b, const double* rate, double* point, double* rhs) {
   for_columns(n, [=](auto width, Index p) __attribute__((always_inline)) {
     using Width = decltype(width);
     Width y = load_as<Width>(state + p);
     Width sum = b * load_as<Width>(rate + p);
+#pragma GCC unroll 5
     for (int j = 0; j < count; ++j) {
       const Width U = load_as<Width>(stage[j] + p);
       y += a[j] * U;
@@ -87,4 +90,20 @@ void combine_stages(std::int64_t n, int count, const double* a, const double* c,
     store(y, point + p);
     store(sum, rhs + p);
   });
+}
+
+void combine_stages(std::int64_t n, int count, const double* a, const double* c, const double* const* stage,
+                    const double* state, double b, const double* rate, double* point, double* rhs) {
+  switch (count) {
+    case 1:
+      return combine_stages_of<1>(n, a, c, stage, state, b, rate, point, rhs);
+    case 2:
+      return combine_stages_of<2>(n, a, c, stage, state, b, rate, point, rhs);
+    case 3:
+      return combine_stages_of<3>(n, a, c, stage, state, b, rate, point, rhs);
+    case 4:
+      return combine_stages_of<4>(n, a, c, stage, state, b, rate, point, rhs);
+    default:
+      return combine_stages_of<5>(n, a, c, stage, state, b, rate, point, rhs);
+  }
 }

@@ -95,8 +95,7 @@ void ClosedLoop::initial_state(const InitialState& initial, Real* state) const {
   }
 }
 
-Plants ClosedLoop::plants(const Real* state, const Real* inputs, Signals& signals) const {
-  if (is_whole_) return {state + layout_.x(), state + layout_.reference()};
+void ClosedLoop::gather_plants(const Real* state, const Real* inputs, Signals& signals) const {
   for (AlignedVector* joint : {&signals.actions, &signals.references}) joint->resize(at(shape().actions()));
   for (const OwnEntry& own : own_) {
     if (own.x >= 0) signals.actions[at(own.entry)] = state[own.x];
@@ -106,7 +105,6 @@ Plants ClosedLoop::plants(const Real* state, const Real* inputs, Signals& signal
   for (const int entry : inputs_.actions()) signals.actions[at(entry)] = *from++;
   from = inputs + inputs_.v();
   for (const int entry : inputs_.velocities()) signals.references[at(entry)] = *from++;
-  return {signals.actions.data(), signals.references.data()};
 }
 
 void ClosedLoop::evaluate_errors(const Real* state, const Real* inputs, const Modes& modes, Signals& signals) const {
@@ -200,7 +198,7 @@ void ClosedLoop::evaluate(Real t, const Real* state, const Real* inputs, const M
   } else {
     std::fill(rate + layout_.weights(), rate + layout_.size(), 0.0);
   }
-  const auto [x, reference] = plants(state, inputs, signals);
+  const auto [x, reference] = found_plants(state, signals);
   if (strategy.perturbed) {
     dynamics->values(x, reference, g, held(of_dynamics, modes));
     disturbance->values(t, d, held(of_disturbance, modes));
@@ -221,6 +219,18 @@ void ClosedLoop::evaluate(Real t, const Real* state, const Real* inputs, const M
                         gains_.k3.data(), state + layout_.estimates(), signals.shared.data(),
                         rate + layout_.estimates());
   if (!inputs_.heard().empty()) add_consensus_with_others(state, inputs, rate);
+}
+
+void ClosedLoop::evaluate_rate_by_time(Real t, Real moment, const Real* inputs, const Modes& modes,
+                                       const Signals& signals, Real* d, Real* rate_by_time) const {
+  std::fill_n(rate_by_time, layout_.size(), 0.0);
+  if (!parameters_.strategy.perturbed) return;
+  parameters_.disturbance->values(t + moment, d, held(of_disturbance, modes));
+  for (std::size_t p = 0; p < own_.size(); ++p) {
+    const int driven = own_[p].second ? own_[p].reference : own_[p].x;
+    const Real change = d[p] + inputs[at(inputs_.d_ext()) + p] - signals.disturbance[p];
+    if (driven >= 0) rate_by_time[driven] = change / moment;
+  }
 }
 
 /// -k3 sum_k a_ik (y_ij - y_kj) over players k elsewhere.

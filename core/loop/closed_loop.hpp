@@ -70,7 +70,10 @@ class ClosedLoop {
   }
 
   /// What the plants stand at: in the state, or in the signals' scratch where some of it are inputs.
-  Plants plants(const Real* state, const Real* inputs, Signals& signals) const;
+  Plants plants(const Real* state, const Real* inputs, Signals& signals) const {
+    if (!is_whole_) gather_plants(state, inputs, signals);
+    return found_plants(state, signals);
+  }
 
   /// The first of the signals: xbar, gradient and error.
   void evaluate_errors(const Real* state, const Real* inputs, const Modes& modes, Signals& signals) const;
@@ -107,6 +110,11 @@ class ClosedLoop {
   /// All signals and state rates at time_origin() + t [s]; the inputs lie as inputs() says.
   void evaluate(Real t, const Real* state, const Real* inputs, const Modes& modes, Signals& signals, Real* rate) const;
 
+  /// How the rates change by time alone at t, per s, while the inputs stand still: by the disturbances, whose change
+  /// over a moment is taken for their derivative. The signals are those at t; d is scratch of own entries.
+  void evaluate_rate_by_time(Real t, Real moment, const Real* inputs, const Modes& modes, const Signals& signals,
+                             Real* d, Real* rate_by_time) const;
+
   /// w'w of each weight column, at own entries.
   void weight_norms(const Real* state, Real* norm2) const;
 
@@ -134,6 +142,12 @@ class ClosedLoop {
     int reference;
     bool second;  ///< order 2
   };
+  void gather_plants(const Real* state, const Real* inputs, Signals& signals) const;
+  /// As plants() found them for this state.
+  [[nodiscard]] Plants found_plants(const Real* state, const Signals& signals) const {
+    if (is_whole_) return {state + layout_.x(), state + layout_.reference()};
+    return {signals.actions.data(), signals.references.data()};
+  }
   void add_consensus_with_others(const Real* state, const Real* inputs, Real* rate) const;
 
   [[nodiscard]] bool is_any_on_sphere(const Modes& modes) const;

@@ -4,7 +4,7 @@
 
 namespace mixed_order_game {
 
-Inputs::Inputs(int count) : numbers_(at(count) * stride) {}
+Inputs::Inputs(int count) : numbers_(at(count) * stride), values_(at(count)) {}
 
 bool Inputs::is_constant(int input) const {
   return std::none_of(polynomial(input) + 1, polynomial(input) + since, [](Real c) { return c != 0.0; });
@@ -13,7 +13,7 @@ bool Inputs::is_constant(int input) const {
 void Inputs::set_value(int input, Real value) {
   const bool was_constant = is_constant(input);
   std::fill_n(polynomial(input), stride, 0.0);
-  polynomial(input)[0] = value;
+  polynomial(input)[0] = values_[at(input)] = value;
   if (!was_constant) find_derivatives();
 }
 
@@ -31,7 +31,7 @@ void Inputs::find_derivatives() {
 void Inputs::values(Real t, Real* value) const {
   const int n = count();
   if (!has_derivatives_) {
-    for (int p = 0; p < n; ++p) value[p] = polynomial(p)[0];
+    std::copy(values_.begin(), values_.end(), value);
     return;
   }
   for (int p = 0; p < n; ++p) {
@@ -51,6 +51,7 @@ void Inputs::rates(Real t, Real* rate) const {
 
 void Inputs::set_numbers(std::span<const Real> numbers) {
   std::copy(numbers.begin(), numbers.end(), numbers_.begin());
+  for (int p = 0; p < count(); ++p) values_[at(p)] = polynomial(p)[0];
   find_derivatives();
 }
 

@@ -23,6 +23,7 @@ class Inputs {
   [[nodiscard]] Real value(int input) const { return polynomial(input)[0]; }
   /// Whether all its derivatives are zero.
   [[nodiscard]] bool is_constant(int input) const;
+  [[nodiscard]] bool are_constant() const { return !has_derivatives_; }
   /// Sets a constant.
   void set_value(int input, Real value);
   /// Sets derivative number order >= 1 [per s^order], counted from time t on.
@@ -47,6 +48,7 @@ class Inputs {
   void find_derivatives();
 
   std::vector<Real> numbers_;  // polynomial by polynomial
+  std::vector<Real> values_;   // value by value
   bool has_derivatives_ = false;
 };
 

@@ -63,6 +63,13 @@ TEST(Inputs, IsSavedAndRestoredWhole) {
   EXPECT_EQ(value_at(other, 11.5), value_at(d, 11.5));
   EXPECT_EQ(value_at(other, 11.5, 0), 0.0);
   EXPECT_TRUE(std::equal(saved.begin(), saved.end(), other.numbers().begin()));
+
+  Inputs constant(3);
+  constant.set_value(2, 5.0);
+  other.set_numbers(constant.numbers());
+  EXPECT_TRUE(other.are_constant());
+  EXPECT_EQ(value_at(other, 11.5, 2), 5.0);
+  EXPECT_EQ(value_at(other, 11.5), 0.0);
 }
 
 }  // namespace

@@ -133,6 +133,24 @@ TEST_P(LoopTangentOfRandomGame, FollowsInputsAndTime) {
   expect_close(rates_and_controls(tangent_), derivative_of(along, 1e-3), 1e-9, "along inputs and time");
 }
 
+TEST_P(LoopTangentOfRandomGame, AlongTimeIsTheRateByTime) {
+  std::vector<std::vector<int>> on_sphere;
+  const AlignedVector state = [&] {
+    const std::vector<Real> flat = random_state(game_, random_, on_sphere).flat();
+    return AlignedVector(flat.begin(), flat.end());
+  }();
+  const Modes modes = modes_of(on_sphere);
+  Numbers inputs(no_inputs_.size());
+  random_.fill(inputs, -1.0, 1.0);
+  tangent_.time = 1.0;
+  tangent_.follow(t, state.data(), inputs.data(), modes);
+  Signals signals(loop_.shape());
+  AlignedVector rate(size_), by_time(size_), d(at(loop_.shape().own_entries()));
+  loop_.evaluate(t, state.data(), inputs.data(), modes, signals, rate.data());
+  loop_.evaluate_rate_by_time(t, 1e-7, inputs.data(), modes, signals, d.data(), by_time.data());
+  expect_close({by_time.begin(), by_time.end()}, {tangent_.rate.begin(), tangent_.rate.end()}, 1e-5, "along time");
+}
+
 /// One kind of parameter: how to move it in the plain game, and the direction's coefficients in the core's order.
 struct Move {
   std::string name;
