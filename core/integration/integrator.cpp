@@ -39,7 +39,7 @@ constexpr Real least_tolerance_of_rosenbrock = 1e-8;
 // The estimate belongs to the solution of order 3, and the one of order 4 is taken. With this factor its errors are
 // those of CVODE, or less, in the paper's game with disturbances that change every 1 to 20 ms and coupled player by
 // player every 5 or 20 ms, at relative tolerances from 1e-4 to 1e-8.
-constexpr Real estimate_over_error = 8.0;
+constexpr Real estimate_over_error = 5.0;
 
 }  // namespace
 
@@ -417,10 +417,13 @@ void Integrator::Implementation::plan_event(Real t) {
 void Integrator::Implementation::settle(Real t, Real* state) {
   if (!loop_.parameters().strategy.robust) return;
   loop_.weight_norms(state, norm2_.data());
+  bool is_to_project = false;
   for (std::size_t p = 0; p < norm2_.size(); ++p) {
-    largest_raw_excess_ = std::max(largest_raw_excess_, norm2_[p] / loop_.gains().W_max[p] - 1.0);
+    const Real W_max = loop_.gains().W_max[p];
+    largest_raw_excess_ = std::max(largest_raw_excess_, norm2_[p] / W_max - 1.0);
+    is_to_project = is_to_project || norm2_[p] > W_max || modes_[p] != 0.0;
   }
-  loop_.project(modes_, inputs_at(t), signals_, state);
+  if (is_to_project) loop_.project(modes_, inputs_at(t), signals_, state);
 }
 
 void Integrator::Implementation::start(Real t, Tolerances tolerances, const JudgingRule& rule) {
