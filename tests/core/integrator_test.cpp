@@ -358,6 +358,7 @@ TEST(Integrator, RestoresCheckpointsBetweenChangesBitForBit) {
     std::vector<Checkpoint> checkpoints;
     std::vector<std::vector<Real>> states;
     std::vector<Statistics> statistics;
+    std::vector<Judgement> judgements;
     std::vector<std::vector<Real>> inputs;
     const auto go = [&](Simulation& each, int k) {
       if (k % 7 < 5) push(each, k);  // two intervals of seven without a change
@@ -369,6 +370,7 @@ TEST(Integrator, RestoresCheckpointsBetweenChangesBitForBit) {
       checkpoints.push_back(run.integrator.checkpoint());
       states.push_back(run.state());
       statistics.push_back(run.integrator.statistics());
+      judgements.push_back(run.integrator.judgement());
       inputs.emplace_back(run.input.numbers().begin(), run.input.numbers().end());
     }
     for (const std::size_t from : {0U, 33U, 5U, 20U, 58U}) {
@@ -380,6 +382,7 @@ TEST(Integrator, RestoresCheckpointsBetweenChangesBitForBit) {
           go(*other, static_cast<int>(k) + 1);
           ASSERT_TRUE(same_bits(other->state(), states[k])) << "from " << from << " to " << k;
           ASSERT_EQ(other->integrator.statistics(), statistics[k]) << "from " << from << " to " << k;
+          ASSERT_TRUE(other->integrator.judgement() == judgements[k]) << "from " << from << " to " << k;
         }
       }
     }
