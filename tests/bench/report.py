@@ -286,7 +286,7 @@ def _sweep(result: Results) -> list[str]:
         _milliseconds(result["run"]),
         f"**{result['ratio']:.2f}** ({_verdict(result['ratio'], 1.5, at_least=False)})",
         f"**{result['speedup']:.2f}** ({_verdict(result['speedup'], 1.85, at_least=True)})",
-        f"{result['limit']:.2f}" if "limit" in result else "",
+        f"{result['limit']:.2f}" if "limit" in result else "not measured",
     ]
     return [
         "## What a sweep costs",
