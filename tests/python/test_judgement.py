@@ -86,6 +86,20 @@ def test_a_run_settles_where_an_error_was_last_outside_within_a_step(fmu: Path) 
     assert settled["settling_time"][-1] == pytest.approx(leaves, abs=1e-4)
 
 
+def test_the_steps_that_follow_changes_are_judged_as_accurately_as_they_run(fmu_of: FmuOf) -> None:
+    changes = {0.1 * k: {"k1": 6.0 + 6.0 * (k % 2), "k4": 15.0 + 20.0 * (k % 2)} for k in range(1, 8)}
+    start = {"settling_band": BAND}
+    with Simulator(fmu_of("two_scalar_players")) as simulator:
+        loose, tight = (
+            simulator.run(
+                stop_time=STOP, step=0.1, tolerance=each, start_values=start, changes=changes, outputs=["x"]
+            )
+            for each in (1e-5, 1e-9)
+        )
+    for figure in JUDGED:
+        assert loose[figure][-1] == pytest.approx(tight[figure][-1], rel=1e-4), figure
+
+
 def test_samples_are_never_beyond(fmu: Path) -> None:
     result = run(fmu, stop_time=4.0, start_values={"judge_from": 0.0})
     largest_control = np.abs(result.u).max(axis=(1, 2))
