@@ -124,6 +124,8 @@ struct Kernels {
   /// correction = correction + scale delta, y = predicted + correction.
   void (*add_correction)(std::int64_t n, double scale, const double* delta, const double* predicted, double* correction,
                          double* y);
+  /// z = z + a (x - y)
+  void (*add_difference)(std::int64_t n, double a, const double* x, const double* y, double* z);
   /// The point state + sum_j a_j stage_j and the right-hand side b rate + sum_j c_j stage_j, for j below count, which
   /// is from 1 to 5.
   void (*combine_stages)(std::int64_t n, int count, const double* a, const double* c, const double* const* stage,

@@ -69,6 +69,7 @@ const Kernels MIXED_ORDER_GAME_JOIN(kernels_, MIXED_ORDER_GAME_LEVEL) = {
     predict_back,
     newton_residual,
     add_correction,
+    add_difference,
     combine_stages,
 };
 

@@ -73,6 +73,13 @@ void add_correction(std::int64_t n, double scale_of, const double* delta, const 
   });
 }
 
+void add_difference(std::int64_t n, double a, const double* x, const double* y, double* z) {
+  set_row(n, z, [=](auto width, Index k) {
+    using Width = decltype(width);
+    return load_as<Width>(z + k) + a * (load_as<Width>(x + k) - load_as<Width>(y + k));
+  });
+}
+
 /// Where their number is known, the coefficients stay in registers.
 template <int count>
 inline void combine_stages_of(Index n, const double* a, const double* c, const double* const* stage,

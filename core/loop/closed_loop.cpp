@@ -243,9 +243,8 @@ void ClosedLoop::add_consensus_with_others(const Real* state, const Real* inputs
     for (int e = rows.start[h]; e < rows.start[h + 1]; ++e) {
       const int k = number_heard_[at(rows.neighbour[e])];
       if (k < 0) continue;
-      const Real* other = inputs + inputs_.y_of(k);
       const Real gain = -gains_.k3[at(h)] * rows.weight[e];
-      for (int p = 0; p < n; ++p) own_rate[p] += gain * (own[p] - other[p]);
+      kernels().add_difference(n, gain, own, inputs + inputs_.y_of(k), own_rate);
     }
   }
 }

@@ -694,6 +694,19 @@ TEST(Vectors, MakeAStepOfNewtonsIteration) {
   }
 }
 
+TEST(Vectors, AddADifference) {
+  RandomNumbers random(20);
+  for (const int n : sizes) {
+    const Array x(n, random), y(n, random), z(n, random);
+    const Array sum = on_every_level([&](const Kernels& kernel) {
+      Array out(z);
+      kernel.add_difference(n, -0.3, x, y, out);
+      return out;
+    });
+    for (int k = 0; k < n; ++k) EXPECT_EQ(sum[k], z[k] + -0.3 * (x[k] - y[k]));
+  }
+}
+
 TEST(Vectors, CombineTheStagesOfAStep) {
   RandomNumbers random(19);
   for (const int n : sizes) {
