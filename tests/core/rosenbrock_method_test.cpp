@@ -9,6 +9,8 @@
 #include <utility>
 #include <vector>
 
+#include "larger.hpp"
+
 namespace mixed_order_game {
 namespace {
 
@@ -71,7 +73,7 @@ std::pair<Vector3, Real> run(DrivenPendulum system, int steps) {
     const Vector3 rate_by_time = system.rate_by_time(k * h);
     EXPECT_EQ(
         method.step({k * h, state.data(), rate.data(), rate_by_time.data()}, h, weight.data(), next.data(), error), 0);
-    largest = std::max(largest, error);
+    largest = testing::larger(largest, error);
     state = next;
   }
   return {state, largest};

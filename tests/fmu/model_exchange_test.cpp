@@ -11,6 +11,7 @@
 
 #include "angle_reduction.hpp"
 #include "importer.hpp"
+#include "larger.hpp"
 
 namespace {
 
@@ -572,7 +573,9 @@ TEST(ModelExchangeRun, AnImporterThatLocatesNothingStaysNearTheSphere) {
     const auto rate = importer.rate();
     for (std::size_t j = 0; j < state.size(); ++j) state[j] += h * rate[j];
     importer.move_to(h * k, state);
-    for (const std::string& column : columns()) largest = std::max(largest, importer.get(column));
+    for (const std::string& column : columns()) {
+      largest = mixed_order_game::testing::larger(largest, importer.get(column));
+    }
     fmi2Boolean enter = fmi2False;
     fmi2Boolean terminate = fmi2False;
     ASSERT_EQ(fmi2CompletedIntegratorStep(importer.component, fmi2True, &enter, &terminate), fmi2OK);

@@ -5,9 +5,10 @@
 #include <pugixml.hpp>
 
 #include "importer.hpp"
+#include "larger.hpp"
 #include "model_description.hpp"
 
-using namespace mixed_order_game;
+using mixed_order_game::Causality, mixed_order_game::ModelVariables, mixed_order_game::Type;
 
 namespace {
 
@@ -150,7 +151,9 @@ std::vector<double> stretch(Slave& slave, int k) {
 
 double largest_difference(Slave& a, Slave& b) {
   double largest = 0.0;
-  for (const std::string& name : outputs(a)) largest = std::max(largest, std::fabs(a.get(name) - b.get(name)));
+  for (const std::string& name : outputs(a)) {
+    largest = mixed_order_game::testing::larger(largest, std::fabs(a.get(name) - b.get(name)));
+  }
   return largest;
 }
 
