@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mixed_order_game.studies.pool import WORKER_DIED, run_cases
+from mixed_order_game.studies.pool import WORKER_DIED, LocalPool, run_cases
 from mixed_order_game.studies.sampler import Settings
 from mixed_order_game.studies.sweep.conduct import sweep
 from mixed_order_game.studies.sweep.definition import Sweep
@@ -91,6 +91,22 @@ def test_chunks_take_a_tenth_of_a_second_and_less_in_the_end() -> None:
     assert sorted(each.row for chunk in outcomes for each in chunk) == list(range(200))
     assert pool.chunks[:4] == [1, 1, 1, 1]  # as long as no run has told what it takes
     assert pool.chunks[4:] == [*[10] * 16, 9, 6, 5, 4, 3, 2, *[1] * 7]
+
+
+@pytest.mark.parametrize("asked", [None, "3"])
+def test_workers_start_threads_only_when_asked(
+    fmu: Path, monkeypatch: pytest.MonkeyPatch, asked: str | None
+) -> None:
+    monkeypatch.delenv("OPENBLAS_NUM_THREADS", raising=False)
+    if asked is not None:
+        monkeypatch.setenv("OPENBLAS_NUM_THREADS", asked)
+    pool = LocalPool(fmu, 1, sweep_workers.tells_of_threads)
+    try:
+        [outcome] = pool.submit(SHORT, [Case(0, {})]).result()
+    finally:
+        pool.close()
+    assert outcome.status == (asked or "1")
+    assert os.environ.get("OPENBLAS_NUM_THREADS") == asked
 
 
 def test_a_worker_keeps_one_fmu_only(fmu: Path) -> None:

@@ -30,6 +30,9 @@ LARGEST_CHUNK = 16
 CHUNK_SECONDS = 0.1
 """CPU time of a chunk's runs, as long as one of them takes no more."""
 
+BLAS_THREADS = "OPENBLAS_NUM_THREADS"
+"""Environment variable that NumPy's OpenBLAS reads when it is loaded."""
+
 QUEUED_PER_WORKER = 2
 READY_EVERY = 0.1
 """Time in s after which run_cases tells again that it is ready for a signal."""
@@ -72,7 +75,8 @@ class LocalPool:
 
     def submit(self, settings: Settings, cases: Sequence[Case]) -> "Future[list[Outcome]]":
         """Give a chunk to a worker."""
-        with blocked_interrupt():  # for the workers that are started here, which import for a while first
+        # for the workers that are started here, which import for a while first
+        with blocked_interrupt(), _without_threads():
             return self._executor.submit(self._work, self._source, settings, cases)
 
     def died(self, error: BaseException) -> bool:
@@ -103,6 +107,22 @@ class LocalPool:
         self._writer.close()
         self._executor.shutdown(wait=True, cancel_futures=True)
         self._reader.close()
+
+
+@contextlib.contextmanager
+def _without_threads() -> Iterator[None]:
+    """Processes started inside start no threads for NumPy's linear algebra, unless the user asked for some.
+
+    Workers have none to do, and each would spin on the others' cores while it imports.
+    """
+    if BLAS_THREADS in os.environ:
+        yield
+        return
+    os.environ[BLAS_THREADS] = "1"
+    try:
+        yield
+    finally:
+        del os.environ[BLAS_THREADS]
 
 
 def _begin(reader: connection.Connection, folder: str) -> None:
