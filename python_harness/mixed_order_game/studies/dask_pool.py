@@ -8,7 +8,7 @@ from typing import Any
 
 from ..extras import need
 from .sampler import Settings
-from .worker import Case, Outcome, PoolError, Work, run_chunk, source_of
+from .worker import Case, Outcome, PoolError, Source, Work, run_chunk
 
 
 class DaskPool:
@@ -22,7 +22,7 @@ class DaskPool:
             raise PoolError(f"there is no Dask scheduler at {scheduler}: {error}") from error
         self._work = work
         self._address = scheduler
-        source = source_of(fmu, elsewhere=True)
+        source = Source.of(fmu, elsewhere=True)
         self._source = self._client.scatter(source, broadcast=bool(self._threads()))
 
     @property

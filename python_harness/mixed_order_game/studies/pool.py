@@ -24,7 +24,7 @@ from typing import Protocol
 from ..errors import ModelError
 from ..interrupts import blocked_interrupt
 from .sampler import Settings
-from .worker import Case, Outcome, PoolError, Work, run_chunk, source_of
+from .worker import Case, Outcome, PoolError, Source, Work, run_chunk
 
 LARGEST_CHUNK = 16
 CHUNK_SECONDS = 0.1
@@ -69,7 +69,7 @@ class LocalPool:
     def __init__(self, fmu: Path, jobs: int, work: Work = run_chunk) -> None:
         self.workers = jobs
         self._work = work
-        self._source = source_of(fmu)
+        self._source = Source.of(fmu)
         self._folder = tempfile.TemporaryDirectory(prefix="mixed-order-game-")
         self._open()
 

@@ -11,6 +11,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from time import thread_time
+from typing import Self
 
 from ..errors import MixedOrderGameError, SimulationError
 from ..fmu.model import Value
@@ -50,12 +51,12 @@ class Source:
     path: Path | None = None
     content: bytes | None = None
 
-
-def source_of(fmu: Path, *, elsewhere: bool = False) -> Source:
-    """The FMU for workers on this machine, or elsewhere."""
-    content = fmu.read_bytes()
-    key, version = hashlib.sha256(content).hexdigest(), package_version()
-    return Source(key, version, content=content) if elsewhere else Source(key, version, path=fmu.resolve())
+    @classmethod
+    def of(cls, fmu: Path, *, elsewhere: bool = False) -> Self:
+        """The FMU for workers on this machine, or elsewhere."""
+        content = fmu.read_bytes()
+        key, version = hashlib.sha256(content).hexdigest(), package_version()
+        return cls(key, version, content=content) if elsewhere else cls(key, version, path=fmu.resolve())
 
 
 Work = Callable[[Source, Settings, Sequence[Case]], list[Outcome]]
