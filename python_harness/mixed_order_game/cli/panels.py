@@ -24,7 +24,7 @@ PANELS = {
     ),
     "What it is judged by": (
         "band", "box", "claims", "largest_error", "neighbourhood", "radius", "settle_time",
-        "settling_time", "strict",
+        "settling_time", "speed", "strict",
     ),
     "What is written": (
         "arm_linux", "as_json", "figure", "file_format", "force", "heat_maps", "kinds", "output",
