@@ -34,8 +34,6 @@ bool is_proof(const Enclosure::Found& found) {
   return found.definition == Enclosure::Definition::everywhere && found.kink == nullptr;
 }
 
-Real middle_of(const Interval& side) { return 0.5 * side.lower + 0.5 * side.upper; }
-
 /// Of a box, with an upper bound of a quantity there.
 struct Part {
   Box box;

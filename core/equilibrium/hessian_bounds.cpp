@@ -11,7 +11,7 @@ namespace mixed_order_game {
 namespace {
 
 /// Where a box is cut in two.
-Real middle_of(const Interval& side) {
+Real cut_of(const Interval& side) {
   if (std::isinf(side.lower) && std::isinf(side.upper)) return 0.0;
   if (std::isinf(side.upper)) return side.lower < 0.0 ? 0.0 : 2.0 * side.lower + 1.0;
   if (std::isinf(side.lower)) return side.upper > 0.0 ? 0.0 : 2.0 * side.upper - 1.0;
@@ -168,7 +168,7 @@ bool HessianBounds::is_convex(int i, const std::vector<Real>& x, Real distance) 
     std::vector<Interval> middle = box.actions;
     for (int l = 0; l < shape.dimension; ++l) {
       const std::size_t own = at(shape.entry(i, l));
-      middle[own] = Interval::of(middle_of(box.actions[own]));
+      middle[own] = Interval::of(cut_of(box.actions[own]));
     }
     const Enclosure::Found there = enclose(i, Columns::own, middle, hessian);
     if (there.definition == Enclosure::Definition::everywhere && there.kink == nullptr) {

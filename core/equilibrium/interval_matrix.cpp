@@ -16,8 +16,6 @@ constexpr Real infinite = std::numeric_limits<Real>::infinity();
 /// Rounding of Eigen's eigenvalues and norms, relative to the matrix.
 constexpr Real rounding = 1e-13;
 
-Real middle_of(const Interval& side) { return 0.5 * side.lower + 0.5 * side.upper; }
-
 }  // namespace
 
 Real norm_bound(const std::vector<Interval>& rows, int D) {

@@ -7,6 +7,9 @@
 
 namespace mixed_order_game {
 
+/// Of an interval with finite ends.
+inline Real middle_of(const Interval& side) { return 0.5 * side.lower + 0.5 * side.upper; }
+
 /// An upper bound of the 2-norms of all matrices of D rows, which lie one behind the other.
 Real norm_bound(const std::vector<Interval>& rows, int D);
 
