@@ -201,7 +201,7 @@ def test_of_quadratic_games_they_are_the_exact_constants(name: str, tmp_path: Pa
     assert np.isinf(beyond.lipschitz).all()
 
 
-DRIVERS = (
+SECOND_ORDER = (
     head(k3=400.0, epsilon=0.1).replace("k4 = 20.0", "k4 = 900.0")
     + """[parameters]
 slope = 0.3
@@ -210,6 +210,11 @@ order = 2
 x0 = 0.4
 z0 = "x0"
 y0 = "x0"
+"""
+)
+DRIVERS = (
+    SECOND_ORDER
+    + """\
 cost = { expression = "x[i]^2 + 0.1 * cosh(x[i]) - 0.2 * x[i] * exp(-slope * sum(x[j] for j in 1..N))" }
 dynamics = { expression = "0.2 * sin(x[i]) - %s" }
 disturbance = { expression = "0.5 * square(t, 3)" }
@@ -264,14 +269,8 @@ def test_friction_with_a_sign_is_not_proved(tmp_path: Path) -> None:
 
 
 SELLERS = (
-    head(k3=400.0, epsilon=0.1).replace("k4 = 20.0", "k4 = 900.0")
-    + """[parameters]
-slope = 0.3
-[defaults]
-order = 2
-x0 = 0.4
-z0 = "x0"
-y0 = "x0"
+    SECOND_ORDER
+    + """\
 cost = { expression = "x[i]^2 + %s - 0.2 * x[i] * exp(-slope * sum(x[j] for j in 1..N))" }
 dynamics = { expression = "0.2 * sin(x[i])" }
 disturbance = { expression = "0.5 * square(t, 3) + 0.2 * cos(2 * t)" }
@@ -343,7 +342,7 @@ def test_the_box_can_be_chosen_and_parameters_changed(sellers: Path) -> None:
     assert "strong monotonicity there (Assumption 3), proved" in shown.stdout
     with pytest.raises(mog.GameError, match="box = -1 is not positive"):
         analyse(sellers, box=-1.0)
-    with pytest.raises(mog.GameError, match="whose constants need no box"):
+    with pytest.raises(mog.GameError, match="whose constants need neither box nor speed"):
         analyse("five_vehicles", box=1.0)
 
 

@@ -91,7 +91,7 @@ def analyse(
             raise GameError(f"{source}: only coefficients have a square term to remove; {expression}")
         return local_analysis(file, source, changes or {}, box=box, speed=speed, radius=radius)
     if box is not None or speed is not None:
-        raise GameError(f"{source}: its costs and dynamics are of coefficients, whose constants need no box")
+        raise GameError(f"{source} is a game of coefficients, whose constants need neither box nor speed")
     with nullcontext(file) if square else _without_square(file) as file:
         analyst = Analyst(
             replace(read_game(file, changes), path=source),
