@@ -8,7 +8,7 @@ largest.
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import astuple, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -276,6 +276,36 @@ def test_theorem_1_coefficients_bound_the_rate(name: str, moved: bool) -> None:
         bound = quadratic(pb.theorem_1_coefficients(c, gains), s.norms) + columns * gains.epsilon + added
         by_part = [*(np.array([1.0, 1.0, 1.0, p, 1.0]) * s.rates)]
         slack(bound, sum(by_part), *by_part)
+
+
+@pytest.mark.parametrize("of_order_1", [True, False])
+def test_theorem_1_loses_no_more_than_products_with_velocities(of_order_1: bool) -> None:
+    """nu r (|vbar_s| + k2 l |xbar - x*| + k2 l sqrt(N) |y - 1 (x) xbar|), r = |x_f - z_f| or |vbar_s|.
+
+    The loss covers it for all norms, and exactly where each product is half the sum of its two squares.
+    """
+    s = next(iter(samples(NAMES[0], 6, count=1)))
+    c = replace(constants_of(s, 0.1), first_velocities=0.0, second_velocities=0.0)
+    gains, nu = s.game.gains, 0.7
+    without = pb.theorem_1_coefficients(c, gains)
+    moved = replace(c, first_velocities=nu) if of_order_1 else replace(c, second_velocities=nu)
+    with_velocities = pb.theorem_1_coefficients(moved, gains)
+    loss = np.subtract(astuple(without), astuple(with_velocities))
+    through, root = gains.k2 * c.lipschitz, math.sqrt(c.players)
+    nu *= math.sqrt(c.first_players if of_order_1 else c.second_players)
+
+    def slack_at(norms: FloatArray) -> float:
+        actions, velocities, tracking, estimates = norms
+        driven = tracking if of_order_1 else velocities
+        products = nu * driven * (velocities + through * actions + through * root * estimates)
+        return float(loss @ norms**2 - products)
+
+    random = np.random.default_rng(6)
+    assert min(slack_at(10.0 ** random.uniform(-2.0, 2.0, 4)) for _ in range(1000)) >= 0.0
+    equal = np.array(
+        [nu * through, nu if of_order_1 else 1.0, 1.0 if of_order_1 else 0.0, nu * through * root]
+    )
+    assert slack_at(equal) == pytest.approx(0.0, abs=1e-12 * float(loss @ equal**2))
 
 
 @pytest.mark.parametrize("name", NAMES)
