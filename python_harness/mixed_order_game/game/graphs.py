@@ -88,9 +88,11 @@ class CommunicationGraph:
             raise GraphError(f"the graph has {self.players} players, the game has {model.players}")
         if self.directed and not model.directed:
             raise GraphError("the graph is directed, and that of the game is not")
-        i, j = np.nonzero(self.adjacency if model.directed else np.triu(self.adjacency))
-        pairs = zip(i.tolist(), j.tolist(), strict=True)
-        return edge_values(model, {(i + 1, j + 1): float(self.adjacency[i, j]) for i, j in pairs})
+        weights = {(i, j): weight for i, j, weight in self.edges}
+        if model.directed:
+            heard = {(j, i): weight for (i, j), weight in weights.items()}
+            weights = heard if self.directed else weights | heard
+        return edge_values(model, weights)
 
 
 def edge_values(model: Model, weights: Mapping[tuple[int, ...], float]) -> dict[str, float]:

@@ -26,8 +26,8 @@ from ..interrupts import blocked_interrupt
 from .sampler import Settings
 from .worker import Case, Outcome, PoolError, Source, Work, run_chunk
 
-LARGEST_CHUNK = 16
-CHUNK_SECONDS = 0.1
+LARGEST_CHUNK = 32
+CHUNK_SECONDS = 0.2
 """CPU time of a chunk's runs, as long as one of them takes no more."""
 
 BLAS_THREADS = "OPENBLAS_NUM_THREADS"

@@ -99,7 +99,7 @@ class Sweep:
         """The FMU's own account of its game."""
         return read_model(self.fmu)
 
-    @property
+    @cached_property
     def shape(self) -> tuple[int, ...]:
         """Lengths of the axes: graphs, initial states, samples, then every grid; the last runs fastest."""
         head = (len(self.graphs), self.initial_states, self.samples)
@@ -172,7 +172,11 @@ class Sweep:
         return False
 
     def _row(self, row: int) -> tuple[int, int, int, dict[str, Value]]:
-        graph, state, point, *indices = (int(k) for k in np.unravel_index(row, self.shape))
+        indices: list[int] = []  # as numpy.unravel_index has them
+        for length in reversed(self.shape):
+            row, index = divmod(row, length)
+            indices.insert(0, index)
+        graph, state, point, *indices = indices
         values: dict[str, Value] = dict(zip(self.ranges, self._points[point].tolist(), strict=True))
         for (name, axis), index in zip(self.grid.items(), indices, strict=True):
             values[name] = axis[index] if isinstance(axis[index], bool) else float(axis[index])
