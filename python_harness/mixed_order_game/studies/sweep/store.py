@@ -46,7 +46,7 @@ class Store:
         self._sweep = sweep
         self._next = 0
         self._waiting: list[dict[str, Any]] = []
-        self._written = monotonic()
+        self._written: float | None = None
         self._schema = schema_of(sweep)
         definition = folder / DEFINITION
         for path in (*folder.glob("*"), *(folder / ROWS).glob("*")):
@@ -88,6 +88,9 @@ class Store:
 
     def write_due(self) -> None:
         """Write the rows that wait, if the last ones were written WRITE_EVERY ago."""
+        if self._written is None:  # the workers are still starting
+            pa.array([], pa.float64())  # at its first array PyArrow imports pandas, where that is installed
+            self._written = monotonic()
         if self._waiting and monotonic() - self._written >= WRITE_EVERY:
             self.close()
 
