@@ -63,6 +63,7 @@ def check_run(design: Design, game: AnalysedGame, fmu: Path) -> None:
     seen = simulate(fmu, game, stop_time=2.0 * design.settling_time, gains=design.gains)
     certificate = design.certificate
     ultimate = certificate.ultimate_level(design.gains, optimal_weight_norm=0.0)
+    assert seen.errors is not None
     level = seen.errors.level(certificate.weights)
     proved = design.domain.level * np.exp(-certificate.rate * seen.time) + ultimate
     assert np.all(level <= proved * (1.0 + 1e-6))
@@ -188,6 +189,7 @@ def test_least_squares_fit_is_admissible_and_best(five: AnalysedGame) -> None:
 
 def test_trajectory_fit_is_admissible_and_no_worse(five: AnalysedGame, fmu: Path) -> None:
     seen = simulate(fmu, five, stop_time=2.0)
+    assert seen.y is not None
     fit = trajectory_fit(five, seen.x, seen.y, W_max=500.0)
     assert fit.weight_norm2.max() <= 500.0 * (1 + 1e-9)
     assert np.all(fit.residual <= fit.dynamics * (1 + 1e-9))

@@ -21,7 +21,7 @@ from mixed_order_game.game.parameters import game_parameters
 from mixed_order_game.theory.analysis import analyse
 from mixed_order_game.theory.certificate import best_certificate
 from mixed_order_game.theory.constants import NO_DYNAMICS, dynamics_constants, loop_constants
-from mixed_order_game.theory.game import game_of_fmu, read_game
+from mixed_order_game.theory.game import game_of_model, read_game
 from tests.bench.larger_games import seekers
 from tests.games_by_hand import BY_HAND, fewer_households
 from tests.oracle.general_loop import Functions, own_gradients
@@ -304,7 +304,7 @@ def test_the_rate_that_is_proved_is_kept_by_a_run(sellers: Path) -> None:
     settled = run.nash_error[run.time > 4.0]
     times = run.time[run.time > 4.0]
     assert -np.polyfit(times, np.log(settled), 1)[0] >= float(rate)
-    game = game_of_fmu(sellers)
+    game = game_of_model(mog.read_model(sellers))
     assert found.bounds is not None
     c = loop_constants(replace(game.parameters, x_star=found.bounds.x_star, bounds=found.bounds))
     weights = best_certificate(c, NO_DYNAMICS, game.gains, tracking=False).weights

@@ -49,7 +49,7 @@ def compare(model: str | Path, loop: GeneralLoop) -> None:
                 start[f"{stem}0{entry}"] = float(value)
     chosen = np.sort(random.choice(len(names), COLUMNS, replace=False))
     with mog.Simulator(model) as simulator:
-        found = simulator.jacobian(names, start, along=[names[k] for k in chosen])
+        found = simulator.jacobian(names, start, along=[[names[k]] for k in chosen])
     for column, k in enumerate(chosen):
         step = np.zeros_like(state)
         step[k] = STEP * max(1.0, abs(state[k]))

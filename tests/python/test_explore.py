@@ -20,7 +20,6 @@ from mixed_order_game.explore.wish import Push, Wish, wish_of
 from mixed_order_game.fmu.model import Value
 from mixed_order_game.fmu.schedule import Disturbance
 from mixed_order_game.game.new import Recipe, new_game
-from mixed_order_game.theory.linearized import linearized_loop
 from tests.conftest import FmuOf
 from tests.explored import Served, served_page
 
@@ -153,9 +152,10 @@ def test_pushes_add_up_while_they_overlap(vehicles: Simulator) -> None:
 def test_the_spectrum_is_that_of_the_linearized_fmu(vehicles: Simulator) -> None:
     changes: dict[str, Value] = {"k2": 2.0, "a[1,3]": 0.7}
     spectrum = spectrum_of(vehicles, changes)
-    (states, matrix) = (loop := linearized_loop(vehicles, changes)).states, loop.matrix
-    first = [k for k, name in enumerate(states) if name.endswith(",1]")]  # coordinates do not interact
-    expected = np.linalg.eigvals(matrix[np.ix_(first, first)])
+    kinds = [vehicles.model.indexed(stem) for stem in "xzvy"]
+    first = [each.name for kind in kinds for index, each in kind.items() if index[-1] == 1]
+    off: dict[str, Value] = {**changes, "robust": False, "perturbed": False}
+    expected = np.linalg.eigvals(vehicles.jacobian(first, off))  # coordinates do not interact
     assert len(spectrum.eigenvalues) == len(expected) == 35
     np.testing.assert_allclose(
         np.poly(spectrum.eigenvalues / 50.0), np.poly(expected / 50.0), rtol=1e-6, atol=1e-9

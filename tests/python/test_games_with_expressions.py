@@ -23,7 +23,7 @@ from mixed_order_game.studies.validate import validate
 from mixed_order_game.theory.analysis import analyse
 from mixed_order_game.theory.constants import dynamics_constants, loop_constants
 from mixed_order_game.theory.game import read_game
-from mixed_order_game.theory.linearized import gradient_jacobian, linearized_loop
+from mixed_order_game.theory.linearized import linearized_loop
 from mixed_order_game.theory.spectrum import (
     gradient_map,
     linear_loop,
@@ -83,6 +83,10 @@ def fmu(game: Path) -> Path:
     return build_fmu(game, game.with_suffix(".fmu"))
 
 
+STATES = [*("x[1,1]", "x[2,1]", "x[3,1]"), *("z[1,1]", "v[2,1]", "v[3,1]")]
+STATES += [f"y[{i},{j},1]" for i in (1, 2, 3) for j in (1, 2, 3)]
+
+
 def unperturbed_rates(state: NDArray[np.float64], price: float, k3: float) -> NDArray[np.float64]:
     """Rates of (x | z_1 | v_2, v_3 | y) by the paper's equations and the costs' derivatives, by hand."""
     x, z, v, y = state[:3], state[3], state[4:6], state[6:].reshape(3, 3)
@@ -115,18 +119,28 @@ def linearization_by_hand(price: float, k3: float) -> tuple[NDArray[np.float64],
     return x, np.array(columns).T
 
 
-@pytest.mark.parametrize("changes", [{}, {"price": 40.0, "k3": 2.0}])
-def test_the_loop_is_linearized_as_by_hand(changes: dict[str, float], fmu: Path) -> None:
+@pytest.fixture(scope="module")
+def hidden(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The same game, of which the FMU shows no estimates."""
+    path = tmp_path_factory.mktemp("hidden") / "sellers.toml"
+    path.write_text(GAME.replace("dimension = 1", 'expose = "outputs"\ndimension = 1'), encoding="utf-8")
+    return build_fmu(path, path.with_suffix(".fmu"))
+
+
+@pytest.mark.parametrize("shown", [True, False])
+@pytest.mark.parametrize("changes", [{}, {"price": 40.0, "k3": 2.0, "a": 1.0}])
+def test_the_loop_is_linearized_as_by_hand(
+    changes: dict[str, float], shown: bool, fmu: Path, hidden: Path
+) -> None:
     x_star, by_hand = linearization_by_hand(changes.get("price", 12.0), changes.get("k3", 50.0))
-    with mog.Simulator(fmu) as simulator:
+    with mog.Simulator(fmu if shown else hidden) as simulator:
+        assert bool(simulator.model.indexed("y")) is shown
         loop = linearized_loop(simulator, changes)
-        jacobian = gradient_jacobian(loop, simulator.model, simulator.model.start_values(changes))
     np.testing.assert_allclose(loop.x_star.ravel(), x_star, rtol=1e-10)
-    assert loop.states[:6] == ("x[1,1]", "x[2,1]", "x[3,1]", "z[1,1]", "v[2,1]", "v[3,1]")
     np.testing.assert_allclose(loop.matrix, by_hand, atol=1e-7)
     assert loop.abscissa == pytest.approx(np.linalg.eigvals(by_hand).real.max(), rel=1e-6)
-    np.testing.assert_allclose(jacobian[0], -by_hand[3, 6:9], atol=1e-7)
-    np.testing.assert_allclose(jacobian[2], -by_hand[5, 12:15] / 20.0, atol=1e-7)
+    np.testing.assert_allclose(loop.jacobian[0], -by_hand[3, 6:9], atol=1e-7)
+    np.testing.assert_allclose(loop.jacobian[2], -by_hand[5, 12:15] / 20.0, atol=1e-7)
 
 
 @pytest.mark.parametrize("name", ["five_vehicles", "opinion_formation"])
@@ -134,10 +148,9 @@ def test_of_a_quadratic_game_it_is_the_loop_itself(name: str) -> None:
     with mog.Simulator(name) as simulator:
         parameters = game_parameters(simulator.model)
         loop = linearized_loop(simulator)
-        jacobian = gradient_jacobian(loop, simulator.model, simulator.model.start_values())
     alike = np.eye(parameters.dimension)
     np.testing.assert_allclose(loop.x_star, nash_equilibrium(parameters), rtol=1e-12, atol=1e-12)
-    np.testing.assert_allclose(jacobian, np.kron(gradient_map(parameters), alike), atol=1e-9)
+    np.testing.assert_allclose(loop.jacobian, np.kron(gradient_map(parameters), alike), atol=1e-9)
     assert loop.abscissa == pytest.approx(spectral_abscissa(linear_loop(parameters)), rel=1e-6)
 
 
@@ -165,7 +178,7 @@ def test_near_the_equilibrium_a_run_decays_at_that_rate(fmu: Path) -> None:
         eigenvalues, vectors = np.linalg.eig(loop.matrix)
         slowest = vectors[:, np.argmax(eigenvalues.real)].real
         near: dict[str, float] = {}
-        for name, part in zip(loop.states, 1e-3 * slowest / np.abs(slowest).max(), strict=True):
+        for name, part in zip(STATES, 1e-3 * slowest / np.abs(slowest).max(), strict=True):
             rest = 0.0 if name.startswith("v") else loop.x_star[int(name.split(",")[-2][-1]) - 1, 0]
             near[name.replace("[", "0[")] = rest + part
         off = {**near, "robust": False, "perturbed": False}

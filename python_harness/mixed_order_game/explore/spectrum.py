@@ -48,9 +48,7 @@ def spectrum_of(simulator: Simulator, changes: Mapping[str, Value]) -> Spectrum:
     local = has_expressions(simulator.model.expressions, "cost") is not None
     try:
         game = game_parameters(simulator.model, changes)
-        matrix = _at_equilibrium(simulator, changes) if local else _linear_loop(game)
-        if not np.isfinite(matrix).all():
-            raise SimulationError("the loop cannot be linearized: a derivative is not finite")
+        matrix = linearized_loop(simulator, changes).matrix if local else _linear_loop(game)
     except MixedOrderGameError as error:
         return Spectrum(np.empty(0, dtype=complex), NOT_COMPUTED, f"{error}.")
     eigenvalues = np.linalg.eigvals(matrix).astype(complex)
@@ -59,12 +57,6 @@ def spectrum_of(simulator: Simulator, changes: Mapping[str, Value]) -> Spectrum:
         float(eigenvalues.real.max()), rounding, is_connected(game.adjacency), " near x*" if local else ""
     )
     return Spectrum(eigenvalues, verdict, reason)
-
-
-def _at_equilibrium(simulator: Simulator, changes: Mapping[str, Value]) -> FloatArray:
-    if not simulator.model.indexed("y"):
-        raise SimulationError('the FMU does not show its estimates (expose = "outputs")')
-    return linearized_loop(simulator, changes).matrix
 
 
 def _linear_loop(game: GameParameters) -> FloatArray:

@@ -516,19 +516,22 @@ class Simulator:
 
     @in_turn
     def jacobian(
-        self, states: Sequence[str], values: Mapping[str, Value], along: Sequence[str] | None = None
+        self,
+        states: Sequence[str],
+        values: Mapping[str, Value],
+        along: Sequence[Sequence[str]] | None = None,
     ) -> NDArray[np.float64]:
         """Derivatives (n, m) in 1/s of the rates of some states along others, after such an initialization.
 
-        Entry [a, b] is the derivative of der(states[a]) along along[b], by default states[b].
+        Entry [a, b] is the derivative of der(states[a]) along all of along[b] together, by default states[b].
         """
-        along = states if along is None else along
+        along = [[name] for name in states] if along is None else along
         rates = [self.model.variable(f"der({name})").reference for name in states]
         columns = []
         with self._initialized(values) as slave:
-            for name in along:
-                reference = self.model.variable(name).reference
-                columns.append(slave.getDirectionalDerivative(rates, [reference], [1.0]))
+            for names in along:
+                references = [self.model.variable(name).reference for name in names]
+                columns.append(slave.getDirectionalDerivative(rates, references, [1.0] * len(references)))
         return np.array(columns, dtype=np.float64).reshape(len(along), len(states)).T
 
     @contextmanager

@@ -1,6 +1,6 @@
 """What a report is made from: runs of one game, the judged claims, and what is known of the unknown."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -19,7 +19,7 @@ from ..studies.claims.tolerances import PLAIN_TOLERANCE, TOLERANCE
 from ..studies.claims.unperturbed_loop import LARGEST_LINEAR_LOOP
 from ..studies.validate import Validation, validate
 from ..theory.analysis import analyse
-from ..theory.findings import Analysis
+from ..theory.findings import Analysis, Progress
 from ..theory.linearized import linearized_loop
 from ..theory.spectrum import linear_loop, spectral_abscissa
 from ..times import in_seconds
@@ -67,7 +67,7 @@ def _predicted_rate(
     if cost:
         try:
             abscissa = linearized_loop(simulator, changes).abscissa
-        except (ModelError, SimulationError) as error:
+        except SimulationError as error:
             return None, [f"No rate is predicted: {cost}, and {error}."]
         return abscissa, [
             f"The predicted rate is that of the loop linearized at x*, for near x* alone: {cost}."
@@ -78,13 +78,11 @@ def _predicted_rate(
 
 
 def _analysis(
-    fmu: Path | str, model: Model, changes: Mapping[str, Value]
+    fmu: Path | str, changes: Mapping[str, Value], progress: Progress | None
 ) -> tuple[Analysis | None, list[str]]:
     """The analysis without runs, and why there is none."""
-    if model.players > LARGEST_LINEAR_LOOP:
-        return None, [f"There is no analysis: the loop of {model.players} players is too large."]
     try:
-        return analyse(fmu, changes=changes, simulation=False), []
+        return analyse(fmu, changes=changes, simulation=False, progress=progress), []
     except (GameError, ModelError, SimulationError) as error:
         return None, [f"There is no analysis: {error}."]
 
@@ -95,7 +93,7 @@ def evidence_of_game(
     changes: Mapping[str, Value] | None = None,
     claims: bool = True,
     stop_time: float | None = None,
-    progress: Callable[[str, float], None] | None = None,
+    progress: Progress | None = None,
 ) -> Evidence:
     """Run an FMU as it stands and unperturbed, and judge its claims.
 
@@ -136,7 +134,7 @@ def evidence_of_game(
     if rates is None:
         unknown = has_expressions(game.expressions, *UNKNOWN)
         notes.append(f"The unknown term is not drawn: {unknown}, and the FMU exposes no time derivatives.")
-    analysis, note = _analysis(fmu, model, changes or {})
+    analysis, note = _analysis(fmu, changes or {}, progress)
     notes += note
     validation = None
     if changes:

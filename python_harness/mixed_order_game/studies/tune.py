@@ -5,7 +5,8 @@ the matrix exponential and its control energy by a Lyapunov equation cost millis
 differential evolution searches there.
 Then the real loop, through the FMU: the wish is tightened until every graph's run meets it, and a few dozen
 runs of Nelder and Mead's simplex lower the energy further. What is returned was simulated on every graph.
-The linear loop knows no perturbation, so a largest error at the end is sought by the simplex alone.
+The linear loop knows no perturbation, so a largest error at the end is sought by the simplex alone. Where
+that loop is too large, everything is.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -24,7 +25,8 @@ from ..game.parameters import GameParameters, game_parameters
 from ..interrupts import noted_signals
 from ..notebook import digits, page, paragraph, table
 from ..results.metrics import METRIC_UNITS, SETTLED, Metrics
-from ..theory.linearized import gradient_jacobian, linearized_loop
+from ..theory.linearized import LARGEST as LARGEST_LINEAR
+from ..theory.linearized import linearized_loop
 from ..theory.spectrum import initial_deviation, linear_loop, owners, spectral_abscissa
 from .designs import Range
 from .pool import open_pool, run_cases
@@ -101,7 +103,8 @@ class Tuned:
     metrics: tuple[Metrics | None, ...]  # one a graph, by simulation; None where the FMU gave up
     start_gains: Mapping[str, float]  # what the game came with
     start_metrics: tuple[Metrics | None, ...]
-    slowest_rate: float  # 1/s, smallest over the graphs: minus the spectral abscissa of the linear loop
+    slowest_rate: float
+    """1/s, smallest over the graphs: minus the spectral abscissa of the linear loop; NaN if too large"""
     simulations: int = field(default=0)
     interrupted: bool = False  # by Ctrl-C: the gains are the best so far
     least_bound: float = float("inf")  # of the controls, u_max; infinite where there is none
@@ -150,6 +153,10 @@ class Tuned:
             for name, each in self.ranges.items()
             if name in self.at_limits
         ]
+        if np.isnan(self.slowest_rate):
+            notes.append(
+                "the linear loop is too large: gains were sought by simulation alone, near the given ones"
+            )
         before, after = self.start_final_error, self.final_error
         if after > WORSE * before:
             told = f"the final error {after:.4g} is {after / before:.3g} times that before, {before:.4g}"
@@ -208,7 +215,7 @@ class Tuned:
             "at_limits": self.at_limits,
             "notes": self.notes,
             "control_energy": self.control_energy if np.isfinite(self.control_energy) else None,
-            "slowest_rate": self.slowest_rate,
+            "slowest_rate": self.slowest_rate if np.isfinite(self.slowest_rate) else None,
             "graphs": len(self.graphs),
             "simulations": self.simulations,
             "interrupted": self.interrupted,
@@ -386,14 +393,9 @@ class _Search:
     def _game(self) -> GameParameters:
         """What the linear loop takes: x* and the Jacobian there, too, where a cost has an expression."""
         model = self.sampler.model
-        game = game_parameters(model, self.fixed)
-        if "cost" not in model.expressions:
-            return game
-        loop = linearized_loop(self.sampler, self.fixed)
-        if not np.isfinite(loop.x_star).all():
-            raise TuneError(f"{model.path}: the FMU knows no Nash equilibrium with these values")
-        jacobian = gradient_jacobian(loop, model, model.start_values(self.fixed))
-        return replace(game, x_star=loop.x_star, jacobian=jacobian)
+        if "cost" in model.expressions:
+            return linearized_loop(self.sampler, self.fixed).game
+        return game_parameters(model, self.fixed)
 
     def run(self, seed: int, progress: Progress) -> Tuned:
         """Both stages, or what is known when Ctrl-C comes."""
@@ -417,7 +419,7 @@ class _Search:
             metrics=tuple(found),
             start_gains=self.start,
             start_metrics=tuple(start_metrics),
-            slowest_rate=min(-spectral_abscissa(linear_loop(self.parameters(gains, a))) for a in self.loops),
+            slowest_rate=self._slowest_rate(gains),
             simulations=self.simulations,
             interrupted=interrupted,
             least_bound=float(self.game.u_max.min()),
@@ -452,12 +454,29 @@ class _Search:
         return lower, upper
 
     @property
+    def states(self) -> int:
+        """Of the linear loop, of one coordinate where coordinates are alike."""
+        return self.actions * (self.game.players + 2)
+
+    @property
     def small(self) -> bool:
         """Whether an evaluation of the linear loop costs milliseconds."""
-        return self.actions * (self.game.players + 2) <= LARGEST_DENSE
+        return self.states <= LARGEST_DENSE
+
+    def _slowest_rate(self, gains: Mapping[str, float]) -> float:
+        """Of the linear loop on the graph where it is slowest, in 1/s; NaN for too many states."""
+        if self.states > LARGEST_LINEAR:
+            return float("nan")
+        return min(-spectral_abscissa(linear_loop(self.parameters(gains, a))) for a in self.loops)
 
     def _robust(self, seed: int, progress: Progress) -> tuple[FloatArray, list[Metrics | None]]:
-        """Points of the linear stage until one of them meets the wish in simulation, or the best of them."""
+        """Points of the linear stage until one of them meets the wish in simulation, or the best of them.
+
+        Where there is no linear stage, that is the game's own point.
+        """
+        if self.states > LARGEST_LINEAR:
+            own = self._own()
+            return own, self.simulate(self.gains(own))
         active = [int(np.argmin([_connectivity(adjacency) for adjacency in self.loops]))]
         target = self.wish
         point: FloatArray | None = None
@@ -492,8 +511,7 @@ class _Search:
         from scipy.optimize import Bounds, differential_evolution
 
         linear = [k for k, name in enumerate(self.names) if name in LINEAR_GAINS]
-        point = np.log([self.start[name] for name in self.names])
-        point = np.asarray(np.clip(point, *self.bounds))
+        point = self._own()
         if not linear:
             return point
 
@@ -559,6 +577,11 @@ class _Search:
         if not (np.isfinite(energy) and np.isfinite(largest)):
             return float(np.exp(UNSTABLE / 10.0)), UNSTABLE
         return energy, float(np.log(max(largest, np.finfo(float).tiny) / self.band))
+
+    def _own(self) -> FloatArray:
+        """The game's own gains, or the nearest ones in the box."""
+        point = np.log([self.start[name] for name in self.names])
+        return np.asarray(np.clip(point, *self.bounds))
 
     def _exact(self, point: FloatArray) -> dict[str, float]:
         return dict(zip(self.names, np.exp(point).tolist(), strict=True))

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-from ..errors import ExperimentError, ModelError, PlotError, SimulationError
+from ..errors import ExperimentError, PlotError, SimulationError
 from ..extras import need
 from ..fmu.build import GameSource
 from ..fmu.model import Model
@@ -235,14 +235,14 @@ def _judged(
     )
 
 
-def _local_abscissa(simulator: Simulator, game: GameParameters) -> float | None:
-    """Of the loop linearized at x*, in 1/s, where a cost has an expression; None where it cannot be had."""
+def _local_abscissa(simulator: Simulator, game: GameParameters) -> float | str:
+    """Of the loop linearized at x*, in 1/s, where a cost has an expression, or why it cannot be had."""
     if not has_expressions(game.expressions, "cost"):
-        return None
+        return "no cost has an expression"
     try:
         return linearized_loop(simulator).abscissa
-    except (ModelError, SimulationError):  # too large, or no estimates to linearize along
-        return None
+    except SimulationError as error:  # too large, or not differentiable there
+        return str(error)
 
 
 def _default_experiment(

@@ -4,18 +4,17 @@ import math
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, nullcontext
 from dataclasses import replace
-from pathlib import Path
 
 from ..arguments import number_argument
 from ..errors import BuildError, GameError
 from ..files.temporary import temporary_folder
 from ..fmu.build import GameSource, build_fmu, fmu_of, source_of
-from ..fmu.model import Value, read_model
+from ..fmu.model import Model, Value, read_model
 from ..game.definition import has_expressions
 from ..game.parts import toml_of_game
-from .analyst import Analyst, Progress
-from .findings import Analysis
-from .game import read_game, without_square
+from .analyst import Analyst
+from .findings import Analysis, Progress
+from .game import game_of_model, without_square
 from .local_analysis import local_analysis
 
 
@@ -85,17 +84,20 @@ def analyse(
         raise GameError(f"radius = {radius:g} is not positive")
     source = source_of(game)
     file = fmu_of(source)
-    expression = has_expressions(read_model(file).expressions)
+    model = read_model(file)
+    expression = has_expressions(model.expressions)
     if expression:
         if not square:
             raise GameError(f"{source}: only coefficients have a square term to remove; {expression}")
-        return local_analysis(file, source, changes or {}, box=box, speed=speed, radius=radius)
+        return local_analysis(
+            file, source, changes or {}, box=box, speed=speed, radius=radius, progress=progress
+        )
     if box is not None or speed is not None:
         raise GameError(f"{source} is a game of coefficients, whose constants need neither box nor speed")
-    with nullcontext(file) if square else _without_square(file) as file:
+    with nullcontext(model) if square else _without_square(model) as model:
         analyst = Analyst(
-            replace(read_game(file, changes), path=source),
-            file if simulation else None,
+            replace(game_of_model(model, changes), path=source),
+            model if simulation else None,
             changes or {},
             radius,
             progress,
@@ -104,9 +106,9 @@ def analyse(
 
 
 @contextmanager
-def _without_square(fmu: Path) -> Iterator[Path]:
-    """The FMU of the same game with every square term of the unknown dynamics removed."""
+def _without_square(model: Model) -> Iterator[Model]:
+    """The same game with every square term of the unknown dynamics removed."""
     with temporary_folder(BuildError) as folder:
         derived = folder / "game.toml"
-        derived.write_text(toml_of_game(without_square(read_game(fmu).tables)), encoding="utf-8")
-        yield build_fmu(derived, derived.with_suffix(".fmu"))
+        derived.write_text(toml_of_game(without_square(model.game)), encoding="utf-8")
+        yield read_model(build_fmu(derived, derived.with_suffix(".fmu")))

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
-from ..errors import GameError, ModelError, SimulationError
-from ..fmu.model import Value, read_model
+from ..errors import GameError, SimulationError
+from ..fmu.model import Model, Value
 from . import paper_bounds
 from .certificate import (
     Certificate,
@@ -33,7 +33,7 @@ from .exact_loop import (
     exact_loop,
     exact_threshold,
 )
-from .findings import Analysis, Demonstration, Figure, Row
+from .findings import Analysis, Demonstration, Figure, Progress, Row
 from .game import AnalysedGame, Gains
 from .hypotheses import (
     Hypothesis,
@@ -68,8 +68,6 @@ COUNTED_MARGIN = 1.1
 LISTED = 10
 """Most players whose constants get a row each; larger games get ranges."""
 
-Progress = Callable[[str, float], None]
-
 
 class Analyst:
     """Collects the rows of one analysis."""
@@ -77,12 +75,13 @@ class Analyst:
     def __init__(
         self,
         game: AnalysedGame,
-        fmu: Path | None,
+        model: Model | None,
         changes: Mapping[str, Value],
         radius: float,
         progress: Progress | None,
     ) -> None:
-        self.game, self.fmu, self.changes, self.radius = game, fmu, changes, radius
+        self.game, self.changes, self.radius = game, changes, radius
+        self.fmu = None if model is None else model.path
         self.progress = progress
         try:
             nash_equilibrium(game.parameters)
@@ -92,7 +91,7 @@ class Analyst:
         self.assumptions = standing_assumptions(game, self.constants)
         self.rows: list[Row] = []
         self.verdicts: list[str] = []
-        self.stop_time = read_model(fmu).stop_time if fmu is not None else DEFAULT_STOP
+        self.stop_time = DEFAULT_STOP if model is None else model.stop_time
 
     def analysis(self, path: Path) -> Analysis:
         """Everything, in the order of the output; path is what the user named."""
@@ -345,7 +344,7 @@ class Analyst:
                 seen = simulate(
                     self.fmu, self.game, stop_time=stop, changes=self.changes, robust=flag, perturbed=flag
                 )
-            except (ModelError, SimulationError) as error:
+            except SimulationError as error:
                 self.verdicts.append(f"The {name} run is missing: {error}")
                 continue
             finally:
@@ -365,9 +364,14 @@ class Analyst:
         since = f"from {begin:g} s on"
         self._row("simulation", "radius", seen.radius(begin), "L", f"largest |x - x*| {since}, given gains")
         self._row("simulation", "mean radius", seen.root_mean_square(begin), "L", f"root mean square {since}")
-        self._row(
-            "simulation", "max |y_i - x*|", float(seen.errors.largest_estimate.max()), "L", "over the run"
-        )
+        if seen.errors is None:
+            self.verdicts.append(
+                "Estimates along the runs, and V with them, are not known: the game is too large for its FMU "
+                "to show them unless its file asks for it."
+            )
+        else:
+            farthest = float(seen.errors.largest_estimate.max())
+            self._row("simulation", "max |y_i - x*|", farthest, "L", "over the run")
         self._row("simulation", "max |x - x*|", float(seen.error.max()), "L", "over the run")
         self._row("simulation", "max w'w", seen.largest_weight_norm2, "1", "largest weight column")
 
@@ -385,7 +389,7 @@ class Analyst:
             return found
         weights = sufficient_gains(c, NO_DYNAMICS, game.gains.k2, rate=game.gains.k2 * c.monotonicity).weights
         level = float(initial_errors(game.parameters).level(weights)[0])
-        if seen is not None:
+        if seen is not None and seen.errors is not None:
             level = max(level, float(seen.errors.level(weights).max()))
             self._row("network", "level seen", level, "L^2", "largest V along the run, sharper weights")
         on_set = domain(Certificate(c, weights, 0.0), level)
@@ -396,7 +400,7 @@ class Analyst:
         self._row(
             "network", "largest |y_i - x*| for delta", reach, "L", "beyond it delta is too small for any W*"
         )
-        if seen is not None:
+        if seen is not None and seen.y is not None:
             along = trajectory_fit(game, seen.x, seen.y, W_max=game.gains.W_max)
             self._fit_rows("along the run", along, None)
             needed = float((along.residual + game.parameters.disturbance_bound).max())
@@ -477,7 +481,7 @@ class Analyst:
                 stop = 2.0 * design.settling_time
                 seen = simulate(self.fmu, self.game, stop_time=stop, gains=design.gains, changes=self.changes)
                 failure = ""
-            except (ModelError, SimulationError) as error:
+            except SimulationError as error:
                 failure = str(error)
         shown = Demonstration(name, design, tuple(design_hypotheses(self.game, design)), seen, failure)
         section = f"design: {name}"
@@ -531,9 +535,9 @@ class Analyst:
         self._row(section, "seen radius", seen_radius, "L", "largest |x - x*| after that time in the run")
         self._row(section, "run's tolerance", floor, "L", "what the integrator may add to |x - x*|")
         self._row(section, "conservatism", conservatism, "1", "guaranteed radius over the larger of the two")
-        self._row(
-            section, "seen max |y_i - x*|", float(seen.errors.largest_estimate.max()), "L", "within the set"
-        )
+        if seen.errors is not None:
+            farthest = float(seen.errors.largest_estimate.max())
+            self._row(section, "seen max |y_i - x*|", farthest, "L", "within the set")
         self._row(
             section, "seen max |u_il|", seen.largest_control, "L/s^order", "largest control, in the transient"
         )

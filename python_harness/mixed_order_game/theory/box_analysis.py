@@ -9,13 +9,12 @@ dynamics depend on velocities, constants hold up to a speed, and so does the set
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import GameError
-from ..fmu.model import Value
+from ..fmu.model import Model, Value
 from ..game.bounds import GameBounds, box_around, game_bounds
 from ..game.parameters import GameParameters
 from . import paper_bounds
@@ -25,7 +24,7 @@ from .constants import NO_DYNAMICS, DynamicsConstants, dynamics_constants, loop_
 from .design import K3_MARGIN, Design, design_within
 from .domain import initial_errors
 from .findings import Demonstration, Figure, Row
-from .game import AnalysedGame, Gains, game_of_fmu
+from .game import AnalysedGame, Gains, game_of_model
 from .graph import unreached
 from .hypotheses import Hypothesis, gain_thresholds, told_for
 from .spectrum import nash_equilibrium
@@ -54,7 +53,7 @@ class BoxFindings:
 
 
 def box_analysis(
-    fmu: Path,
+    model: Model,
     x_star: FloatArray,
     changes: Mapping[str, Value],
     *,
@@ -73,13 +72,13 @@ def box_analysis(
         if value is not None and not (math.isfinite(value) and value > 0.0):
             raise GameError(f"{name} = {value:g} is not positive")
     try:
-        game = game_of_fmu(fmu, changes)
+        game = game_of_model(model, changes)
     except GameError as error:
         return BoxFindings((), (), (), (f"Theorems 1 and 2 are not judged: {error}.",), None)
     game = replace(game, parameters=replace(game.parameters, x_star=x_star))
 
     def bounds_within(distance: float, largest_speed: float) -> GameBounds:
-        return game_bounds(fmu, box_around(x_star, distance), x_star, changes, speed=largest_speed)
+        return game_bounds(model.path, box_around(x_star, distance), x_star, changes, speed=largest_speed)
 
     def judged(distance: float, largest_speed: float) -> _Judge:
         return _Judge(game, bounds_within(distance, largest_speed), distance, radius)

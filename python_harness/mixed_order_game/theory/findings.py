@@ -1,7 +1,7 @@
 """What an analysis hands over: rows of figures, hypotheses, demonstrations and verdicts in plain words."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -16,6 +16,9 @@ from .hypotheses import Hypothesis
 from .simulation import Seen
 
 Figure = float | bool | str
+
+Progress = Callable[[str, float], None]
+"""Called with the name of a step and the part of it done, 0 to 1."""
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..errors import GameError
 from ..fmu.build import fmu_of, source_of
-from ..fmu.model import Value, read_model
+from ..fmu.model import Model, Value, read_model
 from ..game.definition import Table, require_coefficients
 from ..game.parameters import GameParameters, common, game_parameters
 from .graph import consensus_eigenvalues
@@ -71,18 +71,17 @@ def read_game(path: Path | str, changes: Mapping[str, Value] | None = None) -> A
     VariableError for a change that the FMU would not take.
     """
     path = source_of(path)
-    fmu = fmu_of(path)
-    require_coefficients(read_model(fmu).expressions, ANALYSIS)
-    return replace(game_of_fmu(fmu, changes), path=path)
+    model = read_model(fmu_of(path))
+    require_coefficients(model.expressions, ANALYSIS)
+    return replace(game_of_model(model, changes), path=path)
 
 
-def game_of_fmu(path: Path, changes: Mapping[str, Value] | None = None) -> AnalysedGame:
+def game_of_model(model: Model, changes: Mapping[str, Value] | None = None) -> AnalysedGame:
     """The game of an FMU with start values changed; of expressions its parameters tell nothing but where.
 
-    Raises GameError where the theorems' gains, networks or graphs are others than the game's, ModelError for
-    a broken FMU, VariableError for a change that the FMU would not take.
+    Raises GameError where the theorems' gains, networks or graphs are others than the game's, VariableError
+    for a change that the FMU would not take.
     """
-    model = read_model(path)
     _require_alike(model.game)
     values = model.start_values(changes)
     parameters = game_parameters(model, changes)
@@ -99,7 +98,7 @@ def game_of_fmu(path: Path, changes: Mapping[str, Value] | None = None) -> Analy
         centers=centers.reshape(-1, parameters.x0.size),
         width=float(values["rho"]),
         tables=model.game,
-        path=path,
+        path=model.path,
     )
 
 

@@ -5,13 +5,13 @@ from pathlib import Path
 
 import numpy as np
 
-from ..errors import GameError
+from ..errors import SimulationError
 from ..fmu.model import Value
 from ..fmu.run import Simulator
 from ..game.definition import PARTS, Expressions
 from .box_analysis import box_analysis
-from .findings import Analysis, Row
-from .linearized import gradient_jacobian, linearized_loop
+from .findings import Analysis, Progress, Row
+from .linearized import linearized_loop
 
 
 def local_analysis(
@@ -22,45 +22,54 @@ def local_analysis(
     box: float | None,
     speed: float | None,
     radius: float,
+    progress: Progress | None = None,
 ) -> Analysis:
     """Spectrum and monotonicity at x*, said to be local, and the theorems with the constants of a box.
 
     source is what the user named; box, speed and radius are those of `box_analysis`.
 
-    Raises ModelError and SimulationError as linearized_loop does, GameError if there is no such x*.
+    Raises SimulationError as linearized_loop does.
     """
+    report = progress or (lambda _name, _part: None)
     with Simulator(fmu) as simulator:
         model = simulator.model
-        values = model.start_values(changes)
+        changes = model.expanded(changes)
+        report("linearizing", 0.0)
         loop = linearized_loop(simulator, changes)
-        if not np.isfinite(loop.x_star).all():
-            raise GameError(f"{source}: the FMU knows no Nash equilibrium to linearize at")
-    h = gradient_jacobian(loop, model, values)
-    monotonicity = float(np.linalg.eigvalsh(0.5 * (h + h.T))[0])
-    abscissa = loop.abscissa
+    monotonicity = float(np.linalg.eigvalsh(0.5 * (loop.jacobian + loop.jacobian.T))[0])
     where = " at x*" if "cost" in model.expressions else ""
-    rows = (
-        Row("local", "m", monotonicity, "1", f"smallest eigenvalue of the symmetric part of h{where}"),
-        Row("local", "||h||", float(np.linalg.norm(h, 2)), "1", f"norm of the gradients' Jacobian h{where}"),
-        Row("local", "states", len(loop.states), "1", "of the unperturbed loop"),
-        Row("local", "stable", abscissa < 0.0, "1", f"unperturbed loop exponentially stable{where}"),
-        Row("local", "slowest rate", -abscissa, "1/s", "minus the spectral abscissa"),
-    )
-    found = box_analysis(fmu, loop.x_star, changes, box=box, speed=speed, radius=radius)
     kind = "strongly monotone" if monotonicity > 0.0 else "not strongly monotone"
-    verdicts = (
-        _subject(model.expressions),
-        _stability(abscissa, where),
-        f"The pseudo-gradient is {kind}{where}: m = {monotonicity:.4g}.",
-        *found.verdicts,
-    )
+    norm = float(np.linalg.norm(loop.jacobian, 2))
+    rows = [
+        Row("local", "m", monotonicity, "1", f"smallest eigenvalue of the symmetric part of h{where}"),
+        Row("local", "||h||", norm, "1", f"norm of the gradients' Jacobian h{where}"),
+        Row("local", "states", loop.states, "1", "of the unperturbed loop"),
+    ]
+    report("eigenvalues", 0.0)
+    try:
+        abscissa = loop.abscissa
+    except SimulationError as error:
+        stability = f"The spectrum is not computed: {error}."
+    else:
+        stability = _stability(abscissa, where)
+        meaning = f"unperturbed loop exponentially stable{where}"
+        rows.append(Row("local", "stable", abscissa < 0.0, "1", meaning))
+        rows.append(Row("local", "slowest rate", -abscissa, "1/s", "minus the spectral abscissa"))
+    report("box", 0.0)
+    found = box_analysis(model, loop.x_star, changes, box=box, speed=speed, radius=radius)
+    report("box", 1.0)
     return Analysis(
         title=model.title,
         path=source,
         rows=(*rows, *found.rows),
         hypotheses=found.hypotheses,
         demonstrations=found.demonstrations,
-        verdicts=verdicts,
+        verdicts=(
+            _subject(model.expressions),
+            stability,
+            f"The pseudo-gradient is {kind}{where}: m = {monotonicity:.4g}.",
+            *found.verdicts,
+        ),
         constants=None,
         exact=None,
         runs={},

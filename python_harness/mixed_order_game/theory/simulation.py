@@ -8,7 +8,8 @@ from time import monotonic
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import ModelError, SimulationError
+from ..errors import SimulationError
+from ..fmu.estimates import fmu_with_estimates
 from ..fmu.model import Value
 from ..fmu.run import Simulator
 from ..game.parameters import GameParameters
@@ -36,8 +37,8 @@ class Seen:
     time: FloatArray  # (T,), s
     error: FloatArray  # (T,), |x - x*|_2
     x: FloatArray  # (T, N, D)
-    y: FloatArray  # (T, N, N, D)
-    errors: LoopErrors
+    y: FloatArray | None  # (T, N, N, D); None where the game is too large for its FMU to show them
+    errors: LoopErrors | None  # likewise
     largest_weight_norm2: float  # largest w'w of a column
     largest_control: float  # largest |u_il|
     steps: int  # of the integrator
@@ -72,8 +73,7 @@ def simulate(
     """Run the FMU of a game with its own gains or others.
 
     Raises SimulationError as a run does, for an epsilon below SMALLEST_EPSILON and when computing takes
-    longer than time_limit, in s (looked at after each of the SAMPLES steps); ModelError if the FMU does not
-    show its estimates (expose = "outputs").
+    longer than time_limit, in s (looked at after each of the SAMPLES steps).
     """
     own = {} if gains is None else vars(gains)
     values: dict[str, Value] = {**(changes or {}), **own, "robust": robust, "perturbed": perturbed}
@@ -82,9 +82,7 @@ def simulate(
         raise SimulationError(
             f"epsilon = {used.gains.epsilon:.2g} is too small to be simulated in double precision"
         )
-    with Simulator(fmu) as simulator:
-        if not simulator.model.indexed("y"):
-            raise ModelError(f'{fmu} does not show its estimates y (expose = "outputs"), which V needs')
+    with Simulator(fmu_with_estimates(fmu)) as simulator:
         result = simulator.run(
             start_values=values,
             stop_time=stop_time,
@@ -100,12 +98,13 @@ def simulate(
     shape = (len(result.time), game.parameters.players, game.parameters.dimension)
     v = np.nan_to_num(result.v) if (~game.parameters.first_order).any() else np.zeros(shape)
     z = np.nan_to_num(result.z) if used.parameters.first_order.any() else np.zeros(shape)
+    y = result.y if simulator.model.indexed("y") else None
     return Seen(
         time=result.time,
         error=result.nash_error,
         x=result.x,
-        y=result.y,
-        errors=loop_errors(used.parameters, result.x, v, z, result.y),
+        y=y,
+        errors=None if y is None else loop_errors(used.parameters, result.x, v, z, y),
         largest_weight_norm2=float(result.W_norm2.max()),
         largest_control=float(np.abs(result.u).max()),
         steps=int(result["solver_steps"][-1]),

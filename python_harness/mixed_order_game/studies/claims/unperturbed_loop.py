@@ -79,14 +79,16 @@ def spectrum_of(game: GameParameters) -> Spectrum:
     return Spectrum(abscissa, marginal=marginal, slowest_rate=max(0.0, -abscissa))
 
 
-def unperturbed_loop_stable(game: GameParameters, spectrum: Spectrum, local: float | None = None) -> Claim:
+def unperturbed_loop_stable(game: GameParameters, spectrum: Spectrum, local: float | str = "") -> Claim:
     """All eigenvalues have negative real parts.
 
-    Where a cost has an expression, local is the spectral abscissa in 1/s of the loop linearized at x*: a
-    positive one refutes the claim, a negative one does not prove it.
+    Where a cost has an expression, local is the spectral abscissa in 1/s of the loop linearized at x*, or why
+    it is not known: a positive one refutes the claim, a negative one does not prove it.
     """
     expression = has_expressions(game.expressions, "cost")
-    abscissa = local if expression else spectrum.abscissa
+    abscissa = spectrum.abscissa
+    if expression:
+        abscissa = None if isinstance(local, str) else local
 
     def claim(verdict: Verdict, reason: str) -> Claim:
         statement = "Theorem 2: the unperturbed loop is exponentially stable"
@@ -106,10 +108,10 @@ def unperturbed_loop_stable(game: GameParameters, spectrum: Spectrum, local: flo
     return claim(Verdict.HOLDS, f"The spectral abscissa is {abscissa:.4g} 1/s.")
 
 
-def _judged_near(local: float | None, expression: str) -> tuple[Verdict, str]:
+def _judged_near(local: float | str, expression: str) -> tuple[Verdict, str]:
     """Of a loop that is not linear, because of an expression."""
-    if local is None:
-        return Verdict.NOT_COVERED, f"The loop is not linear, {expression}: it has no eigenvalues to judge."
+    if isinstance(local, str):
+        return Verdict.NOT_COVERED, f"The loop is not linear, {expression}; linearized at x*: {local}."
     told = (
         f"The loop is not linear, {expression}; linearized at x* its spectral abscissa is {local:.4g} 1/s: "
     )
