@@ -230,8 +230,9 @@ def test_the_unknown_term_is_that_of_the_formulas_by_hand(fmu: Path) -> None:
     assert np.abs(found - by_hand).max() < 1e-9 * np.abs(by_hand).max()
 
 
-def test_validate_judges_what_it_can(fmu: Path) -> None:
-    found = validate(fmu, limit=100.0)
+def test_validate_judges_what_it_can(hidden: Path) -> None:
+    found = validate(hidden, limit=100.0)
+    assert found.model.path == hidden
     verdicts = {claim.name: claim for claim in found.claims}
     assert verdicts["nash_equilibrium"].verdict is Verdict.HOLDS
     assert verdicts["nash_equilibrium"].statement == "x* is a Nash equilibrium, if only a local one"

@@ -4,13 +4,15 @@ One rule for every game. The switches `robust` and `perturbed` are set for each 
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from ..errors import ExperimentError, PlotError, SimulationError
 from ..extras import need
 from ..fmu.build import GameSource
+from ..fmu.estimates import fmu_with_estimates
 from ..fmu.model import Model
 from ..fmu.run import Progress, Simulator
 from ..game.definition import has_expressions
@@ -211,12 +213,15 @@ def _judged(
     convergence = unperturbed_actions_converge(game, spectrum, plain)
     robust = _default_experiment(simulator, game, progress)
     observed = None
-    practical = _practical_despite(game, stability, convergence) or _unmeasured(model, game)
+    practical = _practical_despite(game, stability, convergence)
     if not practical:
-        observed = observe(
-            simulator, game, slowest_rate=spectrum.slowest_rate, limit=limit, progress=progress
-        )
-        practical = practical_convergence(observed)
+        with _that_shows_the_unknown(simulator) as shown:
+            practical = _unmeasured(shown.model, game)
+            if not practical:
+                observed = observe(
+                    shown, game, slowest_rate=spectrum.slowest_rate, limit=limit, progress=progress
+                )
+                practical = practical_convergence(observed)
     claims = [equilibrium, *practical]
     if neighbourhood is not None:
         claims.append(within_neighbourhood(practical[0], neighbourhood))
@@ -285,14 +290,27 @@ def _practical_despite(game: GameParameters, stability: Claim, convergence: Clai
     return nothing_to_observe(game, Verdict.FAILS, reason)
 
 
+@contextmanager
+def _that_shows_the_unknown(simulator: Simulator) -> Iterator[Simulator]:
+    """The simulator, or one of the same game that shows time derivatives where its file hides them."""
+    fmu = simulator.model.path
+    if recorded_for_unknown_term(simulator.model) is None:
+        fmu = fmu_with_estimates(fmu)
+    if fmu == simulator.model.path:
+        yield simulator
+    else:
+        with Simulator(fmu) as shown:
+            yield shown
+
+
 def _unmeasured(model: Model, game: GameParameters) -> list[Claim]:
     """Theorem 1's claims where the FMU does not show the unknown term; empty where it does."""
     if recorded_for_unknown_term(model) is not None:
         return []
     unknown = has_expressions(game.expressions, *UNKNOWN)
     reason = (
-        f"The residual g + d - W'S cannot be measured: {unknown}, and an FMU that exposes outputs alone has "
-        "no time derivatives."
+        f"The residual g + d - W'S cannot be measured: {unknown}, and the game is too large for its FMU to "
+        "show time derivatives unless its file asks for it."
     )
     return nothing_to_observe(game, Verdict.NOT_COVERED, reason)
 
