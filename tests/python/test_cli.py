@@ -235,6 +235,8 @@ def test_plot_of_game_and_results(fmu: Path, tmp_path: Path) -> None:
     few = mog("plot", fmu, *options)
     assert [Path(line).name for line in few.stdout.splitlines()] == ["error.pdf", "control.pdf"]
     assert mog("plot", fmu, "--kind", "pie").exit_code == 2
+    no_plane = mog("plot", "energy_consumption", "--kind", "plane")
+    assert "the game has 1 coordinate, not 2" in sentence(no_plane)
     assert "nothing to draw until -1 s" in sentence(mog("plot", run, "--until", -1))
     sentence(mog("plot", tmp_path / "none.csv"))
 

@@ -163,6 +163,24 @@ def test_a_result_is_drawn_as_far_as_it_goes() -> None:
         plot.result_figures(replace(whole, columns=bare, parameters={"v0[4,1]": 0.0}))
 
 
+def test_players_of_order_2_alone_share_their_actions() -> None:
+    """They have no references: what was never there is not asked to be recorded."""
+    run = make((2, 2), 1)
+    estimates = {
+        f"y[{i},{j},1]": run[f"x[{j},1]"] + 0.1 * i * np.exp(-run.time) for i in (1, 2) for j in (1, 2)
+    }
+    run = replace(run, columns={**run.columns, **estimates})
+    parameters = {f"v0[{i},1]": 0.0 for i in (1, 2)}
+    without_v = {name: each for name, each in run.columns.items() if name[0] != "v"}
+    for alike in (run, replace(run, columns=without_v, parameters=parameters)):
+        assert np.isnan(alike.z).all()
+        np.testing.assert_array_equal(alike.xbar, alike.x)
+        drawn = curves(plot.plot_estimates(alike))
+        np.testing.assert_allclose(drawn["y[1,1]"], 0.2 * np.exp(-run.time), rtol=1e-12, atol=1e-15)
+    with pytest.raises(ResultError, match="z was not recorded"):
+        _ = replace(make(), parameters={"z0[1,1]": 0.0}).xbar
+
+
 def test_inset_enlarges_a_short_transient_and_covers_no_settled_curve() -> None:
     (inset,) = plot.plot_positions(make()).child_axes
     assert inset.get_xlim()[1] < 2.0

@@ -86,27 +86,34 @@ def plot(
         figures = result_figures(result if until is None else cut(result, until), kinds, width=inches)
         paths = judged(figures)
     else:
-        figures, paths = _figures_of_game(source, kinds or list(KINDS), until, inches, judged)
+        figures, paths = _figures_of_game(source, kinds, until, inches, judged)
     for name, axes in figures.items():
         typer.echo(save_figure(axes, paths[name], force=force))
 
 
 def _figures_of_game(
     source: Path | None,
-    kinds: Sequence[str],
+    asked: Sequence[str] | None,
     until: float | None,
     width: float,
     judged: Callable[[Iterable[str]], dict[str, Path]],
 ) -> "tuple[dict[str, Axes], dict[str, Path]]":
-    """Figures of a robust, perturbed run and of one that is neither, and their files, judged before both."""
+    """Figures of a robust, perturbed run and of one that is neither, and their files, judged before both.
+
+    Raises PlotError for a kind that is asked for and that the game does not have.
+    """
+    from ..errors import PlotError
     from ..fmu.build import SOURCE_OR_RESULT, fmu_of
     from ..fmu.run import Simulator
-    from ..results.plot import paper_figure_names, paper_figures
+    from ..results.plot import KINDS, paper_figure_names, paper_figures, why_none
     from ..results.time_figures import MOST_ESTIMATING
     from ..studies.claims.tolerances import PLAIN_TOLERANCE, TOLERANCE
 
     with Simulator(fmu_of(source, SOURCE_OR_RESULT)) as simulator:
         model = simulator.model
+        for lacking in filter(None, (why_none(model, kind) for kind in asked or ())):
+            raise PlotError(lacking)
+        kinds = asked or list(KINDS)
         paths = judged(paper_figure_names(model, kinds))
         robust, plain = (
             simulator.run(

@@ -185,9 +185,9 @@ def evidence_of_result(result: Result) -> Evidence:
 
 
 def shared_signal(result: Result) -> FloatArray | None:
-    """xbar (T, N, D): z_i of order 1, x_i of order 2; None if z or x was not recorded."""
+    """xbar (T, N, D), what players share; None if z or x was not recorded."""
     try:
-        return np.where(np.isnan(result.z), result.x, result.z)
+        return result.xbar
     except ResultError:
         return None
 

@@ -36,6 +36,12 @@ MOST_NAMED = 20
 EARLIER = "0.6"
 
 
+def no_plane(dimension: int) -> str:
+    """Why a game of another number of coordinates has no paths."""
+    counted = "1 coordinate" if dimension == 1 else f"{dimension} coordinates"
+    return f"paths are drawn in the plane: the game has {counted}, not {PLANE}"
+
+
 def plot_plane(
     result: "Result",
     axes: Axes | None = None,
@@ -51,7 +57,7 @@ def plot_plane(
     parameters. width in inches. Raises PlotError unless D = 2, ResultError if x was not recorded.
     """
     if result.dimension != PLANE:
-        raise PlotError(f"paths are drawn in the plane: the game has {result.dimension} coordinates, not 2")
+        raise PlotError(no_plane(result.dimension))
     x = result.x
     many = result.players > MOST_NAMED
     crowded = result.players > len(PALETTE) and width < TWO_COLUMNS

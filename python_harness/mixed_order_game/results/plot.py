@@ -18,9 +18,10 @@ from ..files.writing import FIGURE, write_file
 from ..fmu.model import Model
 from .error_figure import plot_error
 from .graph_figure import SECOND_ORDER, graph_of_result, plot_graph
-from .plane_figure import PLANE, plot_plane
+from .plane_figure import PLANE, no_plane, plot_plane
 from .style import COLUMN_WIDTH, PAGE_WIDTH, new_axes, paper_style
 from .time_figures import (
+    NO_VELOCITY,
     plot_control,
     plot_estimates,
     plot_positions,
@@ -92,12 +93,14 @@ def cut(result: "Result", until: float) -> "Result":
 
 def paper_figure_names(model: Model, kinds: Sequence[str] = PAPER_KINDS) -> list[str]:
     """Names of the files that paper_figures draws for a game."""
-    figures = dict.fromkeys(kinds)
-    if SECOND_ORDER not in model.order:
-        figures.pop("velocities", None)
-    if model.dimension != PLANE:
-        figures.pop("plane", None)
-    return [name for kind in figures for name in _files_of(kind)]
+    return [name for kind in dict.fromkeys(kinds) if not why_none(model, kind) for name in _files_of(kind)]
+
+
+def why_none(model: Model, kind: str) -> str:
+    """Why a game has no figure of a kind; empty if it has one."""
+    if kind == "velocities" and SECOND_ORDER not in model.order:
+        return NO_VELOCITY
+    return no_plane(model.dimension) if kind == "plane" and model.dimension != PLANE else ""
 
 
 def _files_of(kind: str) -> list[str]:

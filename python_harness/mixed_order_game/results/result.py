@@ -169,8 +169,21 @@ class Result:
 
     @property
     def z(self) -> FloatArray:
-        """References, (T, N, D); NaN for order 2."""
+        """References, (T, N, D); NaN for order 2, or everywhere if no player has order 1."""
+        if not indices_of(self.columns, "z") and self._all_second_order:
+            return np.full((len(self.time), self.players, self.dimension), np.nan)
         return self._signal("z")
+
+    @property
+    def _all_second_order(self) -> bool:
+        """Whether it is known that no player has order 1."""
+        velocities = len(indices_of(self.columns, "v")) == self.players * self.dimension
+        return velocities or (bool(self.parameters) and not indices_of(self.parameters, "z0"))
+
+    @property
+    def xbar(self) -> FloatArray:
+        """What players share, (T, N, D): the reference z of order 1, the action x of order 2."""
+        return np.where(np.isnan(self.z), self.x, self.z)
 
     @property
     def u(self) -> FloatArray:

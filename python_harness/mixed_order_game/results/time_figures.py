@@ -55,6 +55,9 @@ MOST_ESTIMATING = 12
 FAR_BELOW = 0.2
 """Part of W_max below which weights are drawn without the line of it, which would leave them no height."""
 
+NO_VELOCITY = "no player of this game has a velocity: all have order 1"
+"""Why a game has no figure of velocities."""
+
 MOVED = 0.002
 """Part of the largest value by which one has moved when an axis of logarithmic time begins."""
 
@@ -91,7 +94,7 @@ def plot_velocities(result: "Result", axes: Axes | None = None, *, width: float 
     """
     players = second_order_players(result)
     if not players:
-        raise PlotError("no player of this game has a velocity: all have order 1")
+        raise PlotError(NO_VELOCITY)
     with paper_style():
         axes = axes or new_axes(width)
         draw_lines(axes, result, result.v, "v")
@@ -149,8 +152,7 @@ def plot_estimates(result: "Result", axes: Axes | None = None, *, width: float =
     with paper_style():
         axes = axes or new_axes(width)
         if indices_of(result.columns, "y"):
-            shared = np.where(np.isnan(result.z), result.x, result.z)
-            off = np.abs(result.y - shared[:, np.newaxis]).max(axis=(1, 3))
+            off = np.abs(result.y - result.xbar[:, np.newaxis]).max(axis=(1, 3))
             values = off[:, :, np.newaxis]
             draw_lines(axes, result, values, "y")
             over_time(axes, r"$\max_{i,l}\,|y_{ijl} - \bar{x}_{jl}|$" + unit_of(result, "y"))

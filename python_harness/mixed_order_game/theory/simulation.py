@@ -95,9 +95,7 @@ def simulate(
                 if name in simulator.model.variables or simulator.model.indexed(name)
             ],
         )
-    shape = (len(result.time), game.parameters.players, game.parameters.dimension)
-    v = np.nan_to_num(result.v) if (~game.parameters.first_order).any() else np.zeros(shape)
-    z = np.nan_to_num(result.z) if used.parameters.first_order.any() else np.zeros(shape)
+    v, z = np.nan_to_num(result.v), np.nan_to_num(result.z)
     y = result.y if simulator.model.indexed("y") else None
     return Seen(
         time=result.time,

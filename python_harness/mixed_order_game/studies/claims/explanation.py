@@ -58,7 +58,7 @@ def neighbourhood_bound(run: PerturbedRun, game: GameParameters) -> tuple[float,
     )
     late = run.judged
     time, x, v = result.time[late], result.x[late], np.nan_to_num(result.v)[late]
-    z = np.nan_to_num(result.z)[late] if game.first_order.any() else np.zeros_like(x)
+    z = np.nan_to_num(result.z)[late]
     e = np.where(order_1, x - z, -(result.u + result.nn + result.phi)[late] / gain)
     followed = np.where(order_1, z, v - e)  # z_i, or -k2 grad_i f_i(y_i) for order 2
     drift = np.gradient(followed, time, axis=0)
