@@ -8,7 +8,7 @@ from latex2mathml.converter import convert
 
 from mixed_order_game import Game, Recipe, new_game, read_model
 from mixed_order_game.reporting.expression_latex import latex_of
-from mixed_order_game.reporting.formulas import LOOP, costs, disturbances, dynamics
+from mixed_order_game.reporting.formulas import LOOP, costs, disturbances, dynamics, loop
 
 GAMES = Path(__file__).resolve().parents[2] / "modelDescription" / "games"
 
@@ -88,6 +88,16 @@ def test_players_whose_formulas_are_alike_share_a_line() -> None:
         ("1 to 3, 5", r"f_{i}(x) = \lVert x_{i} \rVert^2 + \sum_{k=1}^{D} x_{i,k}^{4}"),
         ("4", r"f_{4}(x) = \lVert x_{4} \rVert^2 + 2\,x_{4,1}^{2}"),
     ]
+    for number in (1, 2, 4):
+        game.player(number)["dynamics"] = {"expression": "sin(x[i,l])"}
+    assert [line.whose for line in dynamics(game.model())] == ["1, 2, 4", "3", "5"]
+
+
+def test_dynamics_name_the_velocities_that_they_depend_on() -> None:
+    model = read_model("underwater_vehicles")
+    assert dynamics(model)[-1].latex.startswith(r"g_{4,l}(x, v) = ")
+    assert loop(model)[0][1] == r"\dot x_i = u_i + g_i(x, v) + d_i(t)"
+    assert loop(read_model("five_vehicles")) == list(LOOP)
 
 
 def test_numbers_of_two_digits_are_one_index(tmp_path: Path) -> None:

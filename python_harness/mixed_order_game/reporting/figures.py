@@ -302,8 +302,9 @@ def _error(evidence: Evidence) -> Figure:
         line = _line(plain.time[shown], predicted[shown], f"slowest rate {rate} 1/s", GREY, dash="dash")
         data.append(line)
         caption += (
-            f" Dashed: exp(-{rate} t), the slowest rate in the linear loop's spectrum, at which the run that "
-            "is neither perturbed nor robust falls in the end, unless it starts without that mode."
+            f" Dashed: exp(-{rate} t), the slowest rate in the spectrum of the linear loop, or of the loop "
+            "linearized at x*, at which the run that is neither perturbed nor robust falls in the end, "
+            "unless it starts without that mode."
         )
     caption += _shade(evidence, "nash_error", 1, data, layout)
     return Figure("error", "Distance to the equilibrium", caption, data, layout)
@@ -433,7 +434,7 @@ def _weights(evidence: Evidence) -> Figure:
             }
             for t in happened
         ]
-        caption += f" Ticks at the bottom: the {int(events[-1])} switches located by the integrator."
+        caption += f" Ticks at the bottom: all {int(events[-1])} events, of whatever kind."
     return Figure("weights", "Weight norms", caption + _left_out(result), data, layout)
 
 

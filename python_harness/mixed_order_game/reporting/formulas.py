@@ -4,6 +4,7 @@ f_i = q_i |x_i|^2 + l_i . x_i + const_i + sum_j c_ij |x_i - x_j|^2, g_i(x)_l = s
 H_ij,l x_jl^2), d_il(t) = bias + amplitude sin(frequency t + phase), each with its expression added.
 """
 
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -35,6 +36,9 @@ LOOP = (
 """What every game has in common: the loop of the paper, line by line."""
 
 
+VELOCITY = re.compile(r"\bv\s*\[")
+"""A velocity in an expression."""
+
 BOUNDED = r"u_{il}\ \text{within}\ [-u_{\max,il},\ u_{\max,il}]"
 
 
@@ -48,11 +52,13 @@ class Formula:
 
 def loop(model: Model | None) -> list[tuple[str, str]]:
     """The lines of the loop, and whose controls are bounded."""
-    players = [] if model is None else range(model.players)
-    bounded = [i for i in players if model is not None and "u_max" in _player(model, i)]
-    if model is None or not bounded:
+    if model is None:
         return list(LOOP)
-    return [*LOOP, (f"bounded control, {_whose(bounded, model.players)}", BOUNDED)]
+    lines = [(name, line.replace("g_i(x)", f"g_i({_actions_and_velocities(model)})")) for name, line in LOOP]
+    bounded = [i for i in range(model.players) if "u_max" in _player(model, i)]
+    if bounded:
+        lines.append((f"bounded control, {_whose(bounded, model.players)}", BOUNDED))
+    return lines
 
 
 def costs(model: Model) -> list[Formula]:
@@ -66,12 +72,22 @@ def costs(model: Model) -> list[Formula]:
 
 def dynamics(model: Model) -> list[Formula]:
     """Unknown dynamics of the players that have some."""
-    return _by_coordinate(model, "g", "x", _dynamics)
+    return _by_coordinate(model, "g", _actions_and_velocities(model), _dynamics)
 
 
 def disturbances(model: Model) -> list[Formula]:
     """Disturbances of the players that have some."""
     return _by_coordinate(model, "d", "t", _disturbance)
+
+
+def _actions_and_velocities(model: Model) -> str:
+    """What the unknown dynamics of a game depend on."""
+    texts = [
+        _text_of(_player(model, i).get("dynamics", {}), k) or ""
+        for i in range(model.players)
+        for k in range(model.dimension)
+    ]
+    return "x, v" if any(VELOCITY.search(text) for text in texts) else "x"
 
 
 def _player(model: Model, i: int) -> Table:
@@ -105,7 +121,7 @@ def _whose(players: Sequence[int], count: int) -> str:
 
 
 def _named(players: Sequence[int], count: int) -> str:
-    """0-based players as 1 to 3, 5; all players."""
+    """0-based players as 1 to 3, 5, 6; all players."""
     if len(players) == count:
         return "all players"
     runs: list[list[int]] = []
@@ -114,7 +130,10 @@ def _named(players: Sequence[int], count: int) -> str:
             runs[-1].append(i)
         else:
             runs.append([i])
-    return ", ".join(f"{run[0] + 1} to {run[-1] + 1}" if len(run) > 1 else str(run[0] + 1) for run in runs)
+    return ", ".join(
+        f"{run[0] + 1} to {run[-1] + 1}" if len(run) > 2 else ", ".join(str(i + 1) for i in run)  # noqa: PLR2004
+        for run in runs
+    )
 
 
 def _by_coordinate(

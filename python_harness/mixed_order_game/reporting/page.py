@@ -256,7 +256,7 @@ def _summary(evidence: Evidence) -> list[tuple[str, str]]:
     if not np.isnan(found.control_energy):
         tiles.append(("control energy", f"{found.control_energy:.4g}"))
     if not np.isnan(found.events):
-        tiles.append(("sphere events", f"{found.events:.0f}"))
+        tiles.append(("events", f"{found.events:.0f}"))
     return tiles
 
 
