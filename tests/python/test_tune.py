@@ -8,7 +8,7 @@ import pytest
 from scipy.linalg import expm
 from typer.testing import CliRunner
 
-from mixed_order_game import read_model
+from mixed_order_game import Recipe, new_game, read_model
 from mixed_order_game.cli.app import app
 from mixed_order_game.errors import VariableError
 from mixed_order_game.game.graphs import GraphError, graphs_of_text
@@ -146,3 +146,13 @@ def test_wishes_that_make_no_sense(
     with pytest.raises(error) as raised:
         tune(fmu, **arguments)  # type: ignore[arg-type]
     assert told in str(raised.value)
+
+
+def test_gains_that_move_no_player_are_not_tuned(tmp_path: Path) -> None:
+    game = tmp_path / "quick.toml"
+    game.write_text(new_game(Recipe(players=2, dimension=1, orders="second", graph="path")), encoding="utf-8")
+    with pytest.raises(TuneError, match="no graph"):  # k1 may be set: it is not among those to be tuned
+        tune(game, 3.0, start_values={"k1": 2.0}, graphs=[])
+    for gains, ranges in ((["k1", "k2"], {}), (None, {"k1": Range(1.0, 2.0)})):
+        with pytest.raises(TuneError, match="k1 moves no player of this game: none has order 1"):
+            tune(game, 3.0, gains=gains, ranges=ranges)

@@ -39,9 +39,13 @@ def tune(
         ),
     ] = None,
     gains: Annotated[
-        str,
-        typer.Option(metavar="NAMES", help="Gains to tune, separated by commas; delta, beta, epsilon too."),
-    ] = "k1,k2,k3,k4",
+        str | None,
+        typer.Option(
+            metavar="NAMES",
+            help="Gains to tune, separated by commas; delta, beta, epsilon too.",
+            show_default="k1,k2,k3,k4, those that move a player",
+        ),
+    ] = None,
     ranges: Annotated[
         list[str] | None,
         typer.Option(
@@ -90,7 +94,7 @@ def tune(
             fmu,
             settling_time,
             graphs=chosen,
-            gains=split_names(gains),
+            gains=None if gains is None else split_names(gains),
             ranges=boxes,
             start_values=fixed,
             band=band,

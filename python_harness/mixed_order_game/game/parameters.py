@@ -25,6 +25,8 @@ OfPlayers = float | FloatArray
 """One number for all players, or an array (N,) where they have their own."""
 
 GAINS = ("k1", "k2", "k3", "k4", "beta", "delta", "epsilon")
+GAINS_OF_ORDER: Mapping[str, int] = {"k1": 1, "k4": 2}
+"""Gains of the players of one order; others are of all."""
 
 
 @dataclass(frozen=True, eq=False)

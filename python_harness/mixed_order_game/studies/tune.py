@@ -21,7 +21,7 @@ from ..errors import MixedOrderGameError, SimulationError
 from ..fmu.build import GameSource
 from ..fmu.model import Model, Value, check_value
 from ..game.graphs import CommunicationGraph, graph_of
-from ..game.parameters import GameParameters, game_parameters
+from ..game.parameters import GAINS_OF_ORDER, GameParameters, game_parameters
 from ..interrupts import noted_signals
 from ..notebook import digits, page, paragraph, table
 from ..results.metrics import METRIC_UNITS, SETTLED, Metrics
@@ -235,7 +235,7 @@ def tune(
     settling_time: float,
     *,
     graphs: Sequence[CommunicationGraph] | None = None,
-    gains: Sequence[str] = LINEAR_GAINS,
+    gains: Sequence[str] | None = None,
     ranges: Mapping[str, Range] | None = None,
     start_values: Mapping[str, Value] | None = None,
     band: float | None = None,
@@ -260,7 +260,7 @@ def tune(
     graphs
         Graphs to tune for; default the game's own.
     gains
-        Names of the gains to tune.
+        Names of the gains to tune; default k1 to k4, without k1 or k4 where no player has order 1 or 2.
     ranges
         Where gains are sought; default `DEFAULT_RANGES`.
     start_values
@@ -320,7 +320,7 @@ class _Search:
         fmu: GameSource,
         wish: float,
         graphs: Sequence[CommunicationGraph] | None,
-        gains: Sequence[str],
+        gains: Sequence[str] | None,
         ranges: Mapping[str, Range],
         start_values: Mapping[str, Value],
         band: float | None,
@@ -333,13 +333,12 @@ class _Search:
         self.largest_error = largest_error
         self.jobs = jobs
         self.fixed = dict(start_values)
-        self.names = tuple(gains)
         self.simulations = 0
         self.best: tuple[dict[str, float], list[Metrics | None]] | None = None  # on all graphs, so far
         self.take_signals: Callable[[], None] = lambda: None
         self.sampler = Sampler(fmu)
         try:
-            self._prepare(graphs, ranges, band)
+            self._prepare(graphs, gains, ranges, band)
         except BaseException:
             self.sampler.close()
             raise
@@ -351,9 +350,14 @@ class _Search:
         self.sampler.close()
 
     def _prepare(
-        self, graphs: Sequence[CommunicationGraph] | None, ranges: Mapping[str, Range], band: float | None
+        self,
+        graphs: Sequence[CommunicationGraph] | None,
+        gains: Sequence[str] | None,
+        ranges: Mapping[str, Range],
+        band: float | None,
     ) -> None:
         model = self.sampler.model
+        self.names = _moving(model) if gains is None else tuple(gains)
         self.fixed = model.expanded(self.fixed)
         if not self.names or len(set(self.names)) != len(self.names):
             raise TuneError("name every gain to tune once")
@@ -361,6 +365,7 @@ class _Search:
         unknown = [name for name in (*self.names, *ranges) if name not in DEFAULT_RANGES]
         if unknown:
             raise TuneError(f"{unknown[0]} is not a gain: one of {', '.join(DEFAULT_RANGES)} expected")
+        _require_moving(model, (*self.names, *ranges))
         clash = [name for name in self.names if name in self.fixed]
         if clash:
             raise TuneError(f"{clash[0]} is both tuned and set")
@@ -720,6 +725,18 @@ def _require_common_gains(model: Model) -> None:
         raise TuneError(
             "tune takes one gain of each kind for all players, and those of this game have their own"
         )
+
+
+def _moving(model: Model) -> tuple[str, ...]:
+    """Gains of the linear loop, without k1 or k4 where no player has order 1 or 2."""
+    return tuple(name for name in LINEAR_GAINS if GAINS_OF_ORDER.get(name) in {None, *model.order})
+
+
+def _require_moving(model: Model, names: Sequence[str]) -> None:
+    for name in names:
+        order = GAINS_OF_ORDER.get(name)
+        if order is not None and order not in model.order:
+            raise TuneError(f"{name} moves no player of this game: none has order {order}")
 
 
 def _connectivity(adjacency: FloatArray) -> float:
