@@ -86,7 +86,12 @@ def test_the_study_tells_which_period_is_survived(tmp_path: Path) -> None:
     assert 0.13 < found["survived"][0] < found["survived"][1] < 0.155
     assert found["unperturbed_limit"] == pytest.approx(0.1618, abs=1e-4)
     assert figure.read_text(encoding="utf-8").count("grows") > 0
-    together = mog.periods("five_vehicles", [0.2], groups=TWO, stop_time=4.0, start_values={"k2": 1.5})
+    together = mog.periods(
+        "five_vehicles", [0.2], groups=TWO, stop_time=4.0, start_values={"k2": 1.5}, search=True
+    )
+    assert "0.2 s is survived: search among longer ones." in together.notes
+    grown = replace(together, runs=(replace(together[0.2], verdict="grows"),))
+    assert "0.2 s is not survived: search among shorter ones." in grown.notes
     assert together[0.2].verdict == "shrinks"
     assert "0.2 s shrinks" in repr(together)
     assert "difference from the whole game" in together._repr_html_()

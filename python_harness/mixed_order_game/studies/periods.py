@@ -65,6 +65,7 @@ class Periods:
     players."""
     survived: tuple[float, float] | None = None
     """Periods in s that were found by search: one that is survived, and one not much longer that is not."""
+    searched: bool = False
 
     def __repr__(self) -> str:
         return (
@@ -85,6 +86,10 @@ class Periods:
         if self.survived is not None:
             inside, beyond = self.survived
             said.append(f"In {self.stop_time:g} s, {inside:.3g} s is survived, {beyond:.3g} s is not.")
+        elif self.searched and self.runs[0].verdict == "grows":
+            said.append(f"{self.runs[0].period:g} s is not survived: search among shorter ones.")
+        elif self.searched:
+            said.append(f"{self.runs[-1].period:g} s is survived: search among longer ones.")
         if self.unperturbed_limit is not None:
             limit = self.unperturbed_limit
             known = (
@@ -221,6 +226,7 @@ def periods(
             runs=tuple(runs),
             unperturbed_limit=_unperturbed_limit(model, coupled.groups, start_values or {}),
             survived=study.search(runs) if search else None,
+            searched=search,
         )
 
 
