@@ -128,15 +128,38 @@ def test_validation_tells_what_the_bounds_do(bounded: Path) -> None:
 def test_each_player_beyond_its_bound_is_told_of_once() -> None:
     game = mog.Game(tomllib.loads(GAME))
     game.player(3)["u_max"] = [2.0, 3.0]
-    told = control_bounds(None, game_parameters(game.model()))
-    assert [note for note in told if "player 3" in note] == [
+    beyond = (
         "To stay at x* the control of player 3 may have to reach 6, beyond its bound 2; then the loop "
         "linearized at x* without bounds is not the one that acts."
-    ]
+    )
+    assert _told_of_player_3(game) == [beyond]
+    game.player(3)["disturbance"] = {"bias": 1.0, "expression": "5 * sin(4 * t)"}
+    game.player(2)["dynamics"] = {"expression": "sin(x[1,l])"}
+    assert _told_of_player_3(game) == [beyond]
+
+
+def _told_of_player_3(game: mog.Game) -> list[str]:
+    model = game.model()
+    return [note for note in control_bounds(None, game_parameters(model), model.path) if "player 3" in note]
+
+
+@pytest.mark.parametrize("expression", [False, True])
+def test_the_analysis_tells_what_the_theorems_do_not_know(expression: bool) -> None:
+    game = mog.Game(tomllib.loads(GAME))
+    if expression:
+        game.player(1)["cost"] = {"expression": "x[1,1]^2 + x[1,2]^2 + x[1,1]"}
+    found = mog.analyse(game, simulation=False)
+    first = found.hypotheses[0]
+    assert (first.name, first.holds) == ("Controls without bounds", False)
+    assert first.figures.startswith("u_max of player 2, 3")
+    assert not any(each.complete for each in found.demonstrations)
+    assert any(
+        each.startswith("Controls are bounded by u_max, which the theorems") for each in found.verdicts
+    )
 
 
 def test_reports_and_tuning_tell_of_bounds(bounded: Path) -> None:
-    assert loop(mog.read_model(bounded))[-1][0] == "bounded control, players 2 to 3"
+    assert loop(mog.read_model(bounded))[-1][0] == "bounded control, players 2, 3"
     assert "merror" not in convert(BOUNDED)
     assert len(loop(mog.read_model())) == len(loop(None)) == len(LOOP)
     weak = mog.tune(bounded, 1.0, gains=["k2"], ranges={"k2": Range(0.9, 1.1)}, band=2.0)

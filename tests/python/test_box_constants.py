@@ -344,6 +344,8 @@ def test_the_box_can_be_chosen_and_parameters_changed(sellers: Path) -> None:
         analyse(sellers, box=-1.0)
     with pytest.raises(mog.GameError, match="whose constants need neither box nor speed"):
         analyse("five_vehicles", box=1.0)
+    with pytest.raises(mog.GameError, match="no dynamics of this game depend on velocities"):
+        analyse("source_seeking", box=0.5, speed=1.0)
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,7 @@
 What reads costs, dynamics or disturbances as coefficients asks here first whether they are all there is.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -86,9 +86,13 @@ def require_coefficients(expressions: Expressions, what: str, *parts: str) -> No
     """
     found = has_expressions(expressions, *parts)
     if found:
-        *most, last = (PARTS[part] for part in parts or PARTS)
-        named = f"{', '.join(most)} and {last}" if most else last
-        raise GameError(f"{what} reads {named} as coefficients; {found}")
+        raise GameError(f"{what} reads {named_parts(parts or PARTS)} as coefficients; {found}")
+
+
+def named_parts(parts: Iterable[str]) -> str:
+    """Keys of a player that may have an expression, as "costs, dynamics and disturbances"."""
+    *most, last = (PARTS[part] for part in parts)
+    return f"{', '.join(most)} and {last}" if most else last
 
 
 def initial_references(player: Table) -> object:

@@ -232,7 +232,7 @@ def _judged(
         claims=tuple(claims),
         notes=(
             *(explain(run, game) for run in _runs(observed)[:1]),
-            *control_bounds(robust if isinstance(robust, Result) else None, game),
+            *control_bounds(robust if isinstance(robust, Result) else None, game, model.path),
             *_notes(game),
         ),
         robust=robust if isinstance(robust, Result) else None,

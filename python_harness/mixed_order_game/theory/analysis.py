@@ -65,7 +65,8 @@ def analyse(
     ------
     GameError
         For a game that is missing, is none or has no unique Nash equilibrium, and for a radius, box or
-        speed that is not positive; for a box or speed of a game of coefficients, which needs none.
+        speed that is not positive; for a box or speed of a game of coefficients, which needs none, and for a
+        speed where no dynamics depend on velocities.
     ModelError, BuildError, VariableError, SimulationError
         As reading, building and running do.
 

@@ -34,8 +34,9 @@ from .exact_loop import (
     exact_threshold,
 )
 from .findings import Analysis, Demonstration, Figure, Progress, Row
-from .game import AnalysedGame, Gains
+from .game import AnalysedGame, Gains, moving
 from .hypotheses import (
+    BOUNDED,
     Hypothesis,
     design_hypotheses,
     gain_thresholds,
@@ -43,6 +44,7 @@ from .hypotheses import (
     robust_term,
     standing_assumptions,
     told_for,
+    unbounded_controls,
     weight_bound,
 )
 from .lyapunov import scaled_identity
@@ -213,6 +215,8 @@ class Analyst:
             told = "; ".join(f"{each.name}, fails ({each.figures})" for each in missing)
             self.verdicts.append(f"Theorems 1 and 2 do not apply: {told}.")
             return
+        if unbounded_controls(self.game.parameters):
+            self.verdicts.append(BOUNDED)
         none = replace(NO_DYNAMICS, lipschitz=np.zeros(c.players))
         paper = paper_thresholds(self.game, c, paper_bounds.theorem_2_coefficients, none)
         self._paper_rows(name, paper)
@@ -249,7 +253,7 @@ class Analyst:
                 if not paper.met
                 else "The sharper certificate proves no rate."
             )
-            + f" At k2 = {gains.k2:g} it asks {needs} 1/s, and any k1 > 0."
+            + f" At k2 = {gains.k2:g} it asks {needs} 1/s{', and any k1 > 0' if c.first_players else ''}."
         )
 
     def _counted_k3(self, sharper: SufficientGains) -> float:
@@ -378,7 +382,7 @@ class Analyst:
     def _own_gains(self, paper: "PaperThresholds | None", seen: Seen | None) -> list[Hypothesis]:
         """The hypotheses of Theorem 1 for the given gains, on the smallest set known to hold the run."""
         game, c = self.game, self.constants
-        found = list(self.assumptions)
+        found = [*unbounded_controls(game.parameters), *self.assumptions]
         begin = SETTLED_PART * self.stop_time
         stays = (
             f"stays within {seen.radius(begin):.3g} of the equilibrium from {begin:g} s on." if seen else ""
@@ -485,7 +489,7 @@ class Analyst:
                 failure = str(error)
         shown = Demonstration(name, design, tuple(design_hypotheses(self.game, design)), seen, failure)
         section = f"design: {name}"
-        for key, value in vars(design.gains).items():
+        for key, value in moving(design.gains, self.game.parameters):
             self._row(
                 section,
                 key,
@@ -522,7 +526,7 @@ class Analyst:
             "from when on 1.01 times the radius holds",
         )
         whole = "every hypothesis of Theorem 1 holds" if shown.complete else "not every hypothesis holds"
-        gains = ", ".join(f"{key} = {value:.3g}" for key, value in vars(design.gains).items())
+        gains = ", ".join(f"{key} = {value:.3g}" for key, value in moving(design.gains, self.game.parameters))
         told = f"By {name} {whole} on the set |y_i - x*| <= {design.domain.estimate_radius:.3g} with {gains}"
         told += " (W* = 0: delta carries all of g)"
         told += f"; guaranteed radius {design.radius:.3g} after {design.settling_time:.3g} s"

@@ -24,9 +24,9 @@ from .constants import NO_DYNAMICS, DynamicsConstants, dynamics_constants, loop_
 from .design import K3_MARGIN, Design, design_within
 from .domain import initial_errors
 from .findings import Demonstration, Figure, Row
-from .game import AnalysedGame, Gains, game_of_model
+from .game import AnalysedGame, Gains, game_of_model, moving
 from .graph import unreached
-from .hypotheses import Hypothesis, gain_thresholds, told_for
+from .hypotheses import BOUNDED, Hypothesis, gain_thresholds, told_for, unbounded_controls
 from .spectrum import nash_equilibrium
 
 FloatArray = NDArray[np.float64]
@@ -66,7 +66,8 @@ def box_analysis(
     box: every action within this distance of x* (N, D); by default as far as the starts, farther where the
     set of the initial state asks for it, nearer where m > 0 is not proved. speed: no |v_jl| is larger; by
     default as at the start, larger where that set asks for it. radius: lim sup of |x - x*| that the designed
-    gains guarantee. Raises GameError if the box or the speed is not positive.
+    gains guarantee. Raises GameError if the box or the speed is not positive, or if a speed is given and no
+    dynamics depend on velocities.
     """
     for name, value in (("box", box), ("speed", speed)):
         if value is not None and not (math.isfinite(value) and value > 0.0):
@@ -87,6 +88,8 @@ def box_analysis(
     if speed is None and "dynamics" in game.parameters.expressions:
         first_speed = MARGIN * fastest_start(game.parameters, bounds_within(0.0, 0.0).first_gradients)
     judge = _where_monotone(game.parameters, judged, first_speed) if box is None else judged(box, first_speed)
+    if speed is not None and not judge.bounds.use_velocities:
+        raise GameError("no dynamics of this game depend on velocities: its constants need no speed")
     return _widened(judge, judged, distance=box is None, speed=speed is None).findings()
 
 
@@ -226,6 +229,8 @@ class _Judge:
         hypotheses: tuple[Hypothesis, ...] = ()
         demonstrations: tuple[Demonstration, ...] = ()
         if self.applicable:
+            if unbounded_controls(self.game.parameters):
+                self.verdicts.append(BOUNDED)
             self._theorem_2()
             hypotheses = self._theorem_1()
             demonstrations = self._designed()
@@ -298,7 +303,8 @@ class _Judge:
             )
         else:
             told = "The sharper certificate proves no rate for the given gains"
-        self.verdicts.append(f"{told}. {asked} 1/s, and any k1 > 0, with the constants of the box.")
+        any_k1 = ", and any k1 > 0," if c.first_players else ""
+        self.verdicts.append(f"{told}. {asked} 1/s{any_k1} with the constants of the box.")
 
     def _theorem_1(self) -> tuple[Hypothesis, ...]:
         c, gains, name = self.constants, self.game.gains, "theorem 1"
@@ -343,6 +349,7 @@ class _Judge:
         along = f", max nu_i = {nu:.4g} where |v_jl| <= {b.speed:.4g}" if b.use_velocities else ""
         connected = not unreached(p.adjacency) and c.slowest_consensus > 0.0
         return [
+            *unbounded_controls(p),
             Hypothesis(
                 "Assumption 1 in the box: own gradients Lipschitz",
                 holds=True,
@@ -378,7 +385,7 @@ class _Judge:
             return ()
         section = f"design: {SHARPER}"
         units = {"epsilon": "1", "W_max": "1", "delta": "L/s"}
-        for key, value in vars(design.gains).items():
+        for key, value in moving(design.gains, self.game.parameters):
             self._row(section, key, value, units.get(key, "1/s"), "designed")
         start = self.start_level(design.certificate)
         ultimate = design.certificate.ultimate_level(design.gains, optimal_weight_norm=0.0)
@@ -412,7 +419,7 @@ class _Judge:
         )
         shown = Demonstration(SHARPER, design, hypotheses, None, "constants are those of a box")
         self._row(section, "hypotheses hold", shown.complete, "1", "all of Theorem 1, on the set")
-        gains = ", ".join(f"{key} = {value:.3g}" for key, value in vars(design.gains).items())
+        gains = ", ".join(f"{key} = {value:.3g}" for key, value in moving(design.gains, self.game.parameters))
         self.verdicts.append(
             f"With {gains} (W* = 0: delta carries all of g) {SHARPER} guarantees the radius "
             f"{design.radius:.3g} after {design.settling_time:.3g} s from starts with V <= {level:.3g}; "

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..game.parameters import GameParameters
 from .constants import LoopConstants, dynamics_bound
 from .design import Design
 from .domain import Domain, initial_errors
@@ -39,14 +40,7 @@ def standing_assumptions(game: AnalysedGame, c: LoopConstants) -> list[Hypothesi
     if p.directed:
         path = "; directed, " + ("not strongly connected" if apart else "strongly connected")
         matrix = f"the symmetric part of {matrix}"
-    bounded = np.flatnonzero(np.isfinite(p.u_max).any(axis=1)) + 1
-    controls = Hypothesis(
-        "Controls without bounds",
-        holds=False,
-        figures=f"u_max of player {', '.join(map(str, bounded))}: the rest tells of runs below it",
-    )
     return [
-        *([controls] if bounded.size else []),
         Hypothesis(
             "Assumption 1: own gradients globally Lipschitz",
             holds=True,
@@ -69,6 +63,15 @@ def standing_assumptions(game: AnalysedGame, c: LoopConstants) -> list[Hypothesi
             "Assumption 5: g globally Lipschitz, d bounded", holds=not squares.size, figures=lipschitz
         ),
     ]
+
+
+def unbounded_controls(parameters: GameParameters) -> list[Hypothesis]:
+    """That no control is bounded, which fails where one is; empty for games without u_max."""
+    bounded = np.flatnonzero(np.isfinite(parameters.u_max).any(axis=1)) + 1
+    if not bounded.size:
+        return []
+    figures = f"u_max of player {', '.join(map(str, bounded))}: the rest tells of runs below it"
+    return [Hypothesis("Controls without bounds", holds=False, figures=figures)]
 
 
 def robust_term(game: AnalysedGame, found: Domain) -> Hypothesis:
@@ -132,6 +135,13 @@ def gain_thresholds(game: AnalysedGame, limits: Thresholds, counted: Gains) -> l
     ]
 
 
+BOUNDED = (
+    "Controls are bounded by u_max, which the theorems do not know: what follows from them is of runs in "
+    "which no control comes to its bound."
+)
+"""Said of games with u_max before anything that a theorem or certificate tells."""
+
+
 def told_for(name: str, counted: Gains) -> str:
     """The gains that a threshold is for, as " for k2 = 1"; empty for k2*."""
     before = {"k2": (), "k4": ("k2", "k3")}.get(name, ("k2",))
@@ -147,6 +157,7 @@ def design_hypotheses(game: AnalysedGame, design: Design) -> list[Hypothesis]:
     start = float(initial_errors(designed.parameters).level(design.certificate.weights)[0])
     ultimate = design.certificate.ultimate_level(design.gains, optimal_weight_norm=0.0)
     return [
+        *unbounded_controls(game.parameters),
         *standing_assumptions(game, c)[:4],
         Hypothesis(
             "Assumption 5 on the set",

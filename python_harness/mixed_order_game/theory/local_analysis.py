@@ -8,7 +8,7 @@ import numpy as np
 from ..errors import SimulationError
 from ..fmu.model import Value
 from ..fmu.run import Simulator
-from ..game.definition import PARTS, Expressions
+from ..game.definition import Expressions, named_parts
 from .box_analysis import box_analysis
 from .findings import Analysis, Progress, Row
 from .linearized import linearized_loop
@@ -78,7 +78,7 @@ def local_analysis(
 
 
 def _subject(expressions: Expressions) -> str:
-    told = " and ".join(PARTS[part] for part in expressions)
+    told = named_parts(expressions)
     if "cost" in expressions:
         return (
             f"Expressions in {told}: what follows is of the loop linearized at x*, and holds near x* alone."
