@@ -234,7 +234,7 @@ Real disturbance_size(const Parameters& parameters, const ExpressionCost::Text& 
 std::string why_not(const char* what, int i, const Enclosure::Found& found) {
   const std::string of_player = std::string("the ") + what + " of player " + std::to_string(i + 1);
   if (found.definition != Enclosure::Definition::everywhere)
-    return of_player + " may have points of the box without a value";
+    return of_player + " may have points of the box without a value or a derivative";
   if (found.kink != nullptr) return of_player + " may switch in the box: \"" + found.kink->text + "\"";
   return of_player + " may have derivatives without a bound in the box";
 }

@@ -2,6 +2,8 @@
 // what they depend on (Dependencies). For reals ClosedLoop evaluates the same terms by kernels.
 #pragma once
 
+#include <algorithm>
+
 #include "loop/input_layout.hpp"
 #include "loop/terms.hpp"
 
@@ -73,12 +75,17 @@ class LoopEquations {
     parameters_.cost->own_gradients(of, y, parameters_.shape.actions(), gradient.data());
   }
   void evaluate_drift(const LoopNumbers<Dual>& number, const Dual& t, const Modes& modes) {
+    if (number.perturbed.value == 0.0) return set_drift_to_zero();  // also where it has no derivative
     parameters_.dynamics->values(*number.dynamics, x.data(), reference.data(), dynamics.data(), held(1, modes));
     parameters_.disturbance->values(*number.disturbance, t, disturbance.data(), held(2, modes));
   }
   void evaluate_drift(const LoopNumbers<Dependencies>& number, const Dependencies& t, const Modes&) {
     parameters_.dynamics->values(*number.dynamics, x.data(), reference.data(), dynamics.data());
     parameters_.disturbance->values(*number.disturbance, t, disturbance.data());
+  }
+  void set_drift_to_zero() {
+    std::fill(dynamics.begin(), dynamics.end(), Scalar(0.0));
+    std::fill(disturbance.begin(), disturbance.end(), Scalar(0.0));
   }
   const Real* held(int family, const Modes& modes) const { return modes.data() + parameters_.first_switch(family); }
 

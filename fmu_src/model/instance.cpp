@@ -350,7 +350,10 @@ void Instance::read_along(std::span<const std::uint32_t> references, const View&
   for (std::size_t k = 0; k < references.size(); ++k) {
     const auto reference = static_cast<int>(references[k]);
     scratch_[k] = variables.family(reference).read_along(source, tangent, variables.variable(reference).slot);
-    if (!std::isfinite(scratch_[k])) require_finite(scratch_[k], "the derivative of " + variables.name(reference));
+    if (std::isfinite(scratch_[k])) continue;
+    throw Error("the derivative of " + variables.name(reference) +
+                " is not finite: a cost, dynamics or a disturbance has none where it is taken, or the parameters or "
+                "initial values are too large");
   }
   std::copy(scratch_.begin(), scratch_.end(), values);
 }

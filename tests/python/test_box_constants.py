@@ -367,3 +367,34 @@ def test_what_is_open_is_named(more: str, told: str, tmp_path: Path) -> None:
     assert game_bounds(path, box_around(x_star, 0.1), x_star).monotone
     # the default box is one within which it is proved
     assert float(analyse(path).value("box", "m")) > 0.0
+
+
+def test_unknown_dynamics_without_a_slope_at_the_equilibrium_leave_the_unperturbed_loop_as_it_is(
+    tmp_path: Path,
+) -> None:
+    """Its matrix does not contain them; perturbed, there is none."""
+    players = "".join(
+        f'[[player]]\nname = "{name}"\norder = {order}\nx0 = 0.6\n'
+        "cost = { quadratic = 1.0, linear = -2.0 }\n"
+        for name, order in (("a", 1), ("b", 2), ("c", 1))
+    )
+    steep = tmp_path / "steep.toml"
+    steep.write_text(
+        head() + '[defaults]\ndynamics = { expression = "sign(x[i] - 1) * sqrt(abs(x[i] - 1))" }\n' + players,
+        encoding="utf-8",
+    )
+    plain = tmp_path / "plain.toml"
+    plain.write_text(head() + players, encoding="utf-8")
+    found = analyse(steep)
+    expected = analyse(plain, simulation=False).exact
+    assert expected is not None
+    assert float(found.value("local", "slowest rate")) == pytest.approx(-expected.abscissa, rel=1e-9)
+    assert "the dynamics of player 1 may have points of the box without a value or a derivative" in " ".join(
+        found.verdicts
+    )
+    states = ("x[1,1]", "y[1,1,1]")
+    at_rest = {f"{stem}[{i},1]": 1.0 for i, stem in ((1, "x0"), (2, "x0"), (3, "x0"))}
+    with mog.Simulator(steep) as simulator:
+        assert np.isfinite(simulator.jacobian(states, {**at_rest, "perturbed": False})).all()
+        with pytest.raises(mog.SimulationError, match="has none where it is taken"):
+            simulator.jacobian(states, at_rest)
