@@ -20,6 +20,7 @@ from ..game.parameters import GameParameters, game_parameters
 from ..notebook import page, paragraph, table
 from ..results.result import Result
 from ..results.unknown_term import UNKNOWN, FloatArray, recorded_for_unknown_term
+from ..theory.growing_modes import Stability, stability
 from ..theory.linearized import linearized_loop
 from .claims.archive import archive_valid
 from .claims.control_bounds import control_bounds
@@ -209,7 +210,7 @@ def _judged(
         plain, spectrum = run_until_decay_is_seen(simulator, game, spectrum, limit, progress)
     else:
         plain = unperturbed_run(simulator, game, spectrum, progress=progress)
-    stability = unperturbed_loop_stable(game, spectrum, _local_abscissa(simulator, game))
+    stability = unperturbed_loop_stable(game, spectrum, _locally(simulator, game))
     convergence = unperturbed_actions_converge(game, spectrum, plain)
     robust = _default_experiment(simulator, game, progress)
     observed = None
@@ -240,14 +241,18 @@ def _judged(
     )
 
 
-def _local_abscissa(simulator: Simulator, game: GameParameters) -> float | str:
-    """Of the loop linearized at x*, in 1/s, where a cost has an expression, or why it cannot be had."""
+def _locally(simulator: Simulator, game: GameParameters) -> float | Stability | None:
+    """Of the loop linearized at x*, where a cost has an expression: its spectral abscissa in 1/s.
+
+    Of a large one it is whether it is stable.
+    """
     if not has_expressions(game.expressions, "cost"):
-        return "no cost has an expression"
+        return None
     try:
-        return linearized_loop(simulator).abscissa
-    except SimulationError as error:  # too large, or not differentiable there
-        return str(error)
+        loop = linearized_loop(simulator)
+    except SimulationError as error:
+        return Stability(None, str(error))
+    return stability(loop.game) if loop.is_large else loop.abscissa
 
 
 def _default_experiment(
@@ -275,10 +280,11 @@ def _default_experiment(
 def _practical_despite(game: GameParameters, stability: Claim, convergence: Claim) -> list[Claim]:
     """Theorem 1's claims where Theorem 2's decide them already, by an unstable loop; empty where not.
 
-    Large loops are not examined for stability: there the actions that leave x* show it.
+    Where the stability is not known, actions that leave x* show it.
     """
     if stability.verdict is Verdict.FAILS:
-        unstable = f"spectral abscissa {stability.figures['abscissa']:.4g} 1/s"
+        known = stability.figures.get("abscissa")
+        unstable = "modes grow" if known is None else f"spectral abscissa {known:.4g} 1/s"
     elif stability.verdict is Verdict.NOT_COVERED and convergence.verdict is Verdict.FAILS:
         unstable = "its actions leave x*"
     else:

@@ -35,6 +35,7 @@ from .exact_loop import (
 )
 from .findings import Analysis, Demonstration, Figure, Progress, Row
 from .game import AnalysedGame, Gains, moving
+from .growing_modes import stability
 from .hypotheses import (
     BOUNDED,
     Hypothesis,
@@ -93,6 +94,7 @@ class Analyst:
         self.assumptions = standing_assumptions(game, self.constants)
         self.rows: list[Row] = []
         self.verdicts: list[str] = []
+        self.stable: bool | None = None  # the unperturbed loop
         self.stop_time = DEFAULT_STOP if model is None else model.stop_time
 
     def analysis(self, path: Path) -> Analysis:
@@ -100,7 +102,7 @@ class Analyst:
         self._report("constants", 0.0)
         self._constants()
         exact = self._exact()
-        self._theorem_2(exact)
+        self._theorem_2()
         paper = self._theorem_1()
         runs = self._runs(exact)
         hypotheses = self._own_gains(paper, runs.get("robust"))
@@ -168,12 +170,23 @@ class Analyst:
     def _exact(self) -> ExactLoop | None:
         p = self.game.parameters
         if p.players > LARGEST_LINEAR_LOOP:
-            self._row(
-                "exact", "states", 2 * p.players + p.players**2, "1", "too many for the dense linear loop"
-            )
-            self.verdicts.append("The exact spectrum is not computed: the game has too many players.")
+            states = 2 * p.players + p.players**2
+            self._row("exact", "states", states, "1", "of a coordinate, too many for their eigenvalues")
+            self._report("counting eigenvalues", 0.0)
+            judged = stability(p)
+            self.stable = judged.stable
+            if judged.stable is not None:
+                meaning = "unperturbed loop exponentially stable"
+                self._row("exact", "stable", judged.stable, "1", meaning)
+            begin = {
+                True: "these gains converge exponentially",
+                False: "these gains do not converge",
+                None: "stability is not decided",
+            }[judged.stable]
+            self.verdicts.append(f"Without perturbation {begin}: {judged.told}.")
             return None
         exact = exact_loop(p)
+        self.stable = exact.stable
         self._row("exact", "stable", exact.stable, "1", "unperturbed loop exponentially stable")
         self._row("exact", "slowest rate", -exact.abscissa, "1/s", "minus the spectral abscissa")
         part = f"{100.0 * SETTLED:.0f} %"
@@ -208,7 +221,7 @@ class Analyst:
         )
         return exact
 
-    def _theorem_2(self, exact: ExactLoop | None) -> None:
+    def _theorem_2(self) -> None:
         c, gains, name = self.constants, self.game.gains, "theorem 2"
         if not self._applicable:
             missing = [each for each in self.assumptions[1:3] if not each.holds]
@@ -236,11 +249,10 @@ class Analyst:
             self.verdicts.append("Theorem 2 holds for the given gains: every gain exceeds its threshold.")
         else:
             told = "; ".join(f"{each.name} ({each.figures})" for each in missed)
-            although = exact is not None and exact.stable
             sufficient = " The loop is stable all the same: the theorem is sufficient, not necessary."
             self.verdicts.append(
                 f"Theorem 2 guarantees nothing for the given gains. What fails: {told}."
-                + (sufficient if although else "")
+                + (sufficient if self.stable else "")
             )
         needs = f"k3 > {sharper.k3:.3g}"
         if c.second_players:

@@ -38,9 +38,14 @@ class LinearizedLoop:
         return (2 + self.game.players) * self.x_star.size
 
     @property
+    def is_large(self) -> bool:
+        """Whether it has more than LARGEST states: there is no M and no abscissa then."""
+        return self.states > LARGEST
+
+    @property
     def matrix(self) -> FloatArray:
         """M (n, n) in 1/s. Raises SimulationError for more than LARGEST states."""
-        if self.states > LARGEST:
+        if self.is_large:
             raise SimulationError(
                 f"the loop has {self.states:,} states, too many for its eigenvalues, which are computed up "
                 f"to {LARGEST:,}"

@@ -5,12 +5,12 @@ from pathlib import Path
 
 import numpy as np
 
-from ..errors import SimulationError
 from ..fmu.model import Value
 from ..fmu.run import Simulator
 from ..game.definition import Expressions, named_parts
 from .box_analysis import box_analysis
 from .findings import Analysis, Progress, Row
+from .growing_modes import Stability, stability
 from .linearized import linearized_loop
 
 
@@ -46,15 +46,15 @@ def local_analysis(
         Row("local", "states", loop.states, "1", "of the unperturbed loop"),
     ]
     report("eigenvalues", 0.0)
-    try:
-        abscissa = loop.abscissa
-    except SimulationError as error:
-        stability = f"The spectrum is not computed: {error}."
+    if loop.is_large:
+        judged = stability(loop.game)
     else:
-        stability = _stability(abscissa, where)
-        meaning = f"unperturbed loop exponentially stable{where}"
-        rows.append(Row("local", "stable", abscissa < 0.0, "1", meaning))
+        abscissa = loop.abscissa
+        judged = _by_abscissa(abscissa)
         rows.append(Row("local", "slowest rate", -abscissa, "1/s", "minus the spectral abscissa"))
+    if judged.stable is not None:
+        meaning = f"unperturbed loop exponentially stable{where}"
+        rows.insert(3, Row("local", "stable", judged.stable, "1", meaning))
     report("box", 0.0)
     found = box_analysis(model, loop.x_star, changes, box=box, speed=speed, radius=radius)
     report("box", 1.0)
@@ -66,7 +66,7 @@ def local_analysis(
         demonstrations=found.demonstrations,
         verdicts=(
             _subject(model.expressions),
-            stability,
+            _stability(judged, where),
             f"The pseudo-gradient is {kind}{where}: m = {monotonicity:.4g}.",
             *found.verdicts,
         ),
@@ -86,11 +86,19 @@ def _subject(expressions: Expressions) -> str:
     return f"Expressions in {told}: what follows is of the unperturbed loop, which is linear."
 
 
-def _stability(abscissa: float, where: str) -> str:
-    begin = "Without perturbation"
+def _by_abscissa(abscissa: float) -> Stability:
     if abscissa < 0.0:
-        near = " near x*, from a start that is close enough to it" if where else ""
-        return f"{begin} these gains converge exponentially{near}: slowest rate {-abscissa:.4g} 1/s."
+        return Stability(stable=True, told=f"slowest rate {-abscissa:.4g} 1/s")
     if abscissa > 0.0:
-        return f"{begin} these gains do not converge{where}: an eigenvalue has real part {abscissa:.4g} 1/s."
-    return f"{begin} stability{where} is not decided: the spectral abscissa is zero to rounding."
+        return Stability(stable=False, told=f"an eigenvalue has real part {abscissa:.4g} 1/s")
+    return Stability(stable=None, told="the spectral abscissa is zero to rounding")
+
+
+def _stability(judged: Stability, where: str) -> str:
+    begin = "Without perturbation"
+    if judged.stable is None:
+        return f"{begin} stability{where} is not decided: {judged.told}."
+    if judged.stable:
+        near = " near x*, from a start that is close enough to it" if where else ""
+        return f"{begin} these gains converge exponentially{near}: {judged.told}."
+    return f"{begin} these gains do not converge{where}: {judged.told}."

@@ -16,6 +16,7 @@ from ...fmu.run import Progress, Simulator
 from ...game.definition import has_expressions
 from ...game.parameters import GameParameters
 from ...results.result import Result
+from ...theory.growing_modes import Stability, stability
 from ...theory.spectrum import consensus_rate, linear_loop, monotonicity_constant, predicted_deviation
 from .early_end import Ended, run_or_end
 from .settling import EXTENSION, TIME_CONSTANTS, window_maxima, window_of
@@ -79,16 +80,18 @@ def spectrum_of(game: GameParameters) -> Spectrum:
     return Spectrum(abscissa, marginal=marginal, slowest_rate=max(0.0, -abscissa))
 
 
-def unperturbed_loop_stable(game: GameParameters, spectrum: Spectrum, local: float | str = "") -> Claim:
+def unperturbed_loop_stable(
+    game: GameParameters, spectrum: Spectrum, local: float | Stability | None = None
+) -> Claim:
     """All eigenvalues have negative real parts.
 
-    Where a cost has an expression, local is the spectral abscissa in 1/s of the loop linearized at x*, or why
-    it is not known: a positive one refutes the claim, a negative one does not prove it.
+    Where a cost has an expression, local is the spectral abscissa in 1/s of the loop linearized at x*, or
+    whether that is stable: an unstable one refutes the claim, a stable one does not prove it.
     """
     expression = has_expressions(game.expressions, "cost")
     abscissa = spectrum.abscissa
     if expression:
-        abscissa = None if isinstance(local, str) else local
+        abscissa = local if isinstance(local, float) else None
 
     def claim(verdict: Verdict, reason: str) -> Claim:
         statement = "Theorem 2: the unperturbed loop is exponentially stable"
@@ -98,9 +101,9 @@ def unperturbed_loop_stable(game: GameParameters, spectrum: Spectrum, local: flo
     if expression:
         return claim(*_judged_near(local, expression))
     if abscissa is None:
-        states = 2 * game.players + game.players**2
-        reason = f"The linear loop has {states:,} states a coordinate, too many for its eigenvalues."
-        return claim(Verdict.NOT_COVERED, reason)
+        counted = stability(game)
+        verdicts = {True: Verdict.HOLDS, False: Verdict.FAILS, None: Verdict.NOT_COVERED}
+        return claim(verdicts[counted.stable], f"{counted.told[0].upper()}{counted.told[1:]}.")
     if spectrum.marginal:
         return claim(Verdict.NOT_SETTLED, f"The spectral abscissa is zero to rounding, {abscissa:.2g} 1/s.")
     if spectrum.unstable:
@@ -108,10 +111,15 @@ def unperturbed_loop_stable(game: GameParameters, spectrum: Spectrum, local: flo
     return claim(Verdict.HOLDS, f"The spectral abscissa is {abscissa:.4g} 1/s.")
 
 
-def _judged_near(local: float | str, expression: str) -> tuple[Verdict, str]:
+def _judged_near(local: float | Stability | None, expression: str) -> tuple[Verdict, str]:
     """Of a loop that is not linear, because of an expression."""
-    if isinstance(local, str):
-        return Verdict.NOT_COVERED, f"The loop is not linear, {expression}; linearized at x*: {local}."
+    if local is None:
+        return Verdict.NOT_COVERED, f"The loop is not linear, {expression}: it has no eigenvalues to judge."
+    if isinstance(local, Stability):
+        told = f"The loop is not linear, {expression}; linearized at x*, {local.told}"
+        if local.stable is False:
+            return Verdict.FAILS, f"{told}: they grow there."
+        return Verdict.NOT_COVERED, f"{told}{': it is exponentially stable near x*' if local.stable else ''}."
     told = (
         f"The loop is not linear, {expression}; linearized at x* its spectral abscissa is {local:.4g} 1/s: "
     )

@@ -1,0 +1,176 @@
+"""Whether a loop that is too large for its eigenvalues is stable: how many of them have positive real parts.
+
+Without robust part and perturbation the estimates of a player answer to what they estimate alone. With the
+Laplace transform C(s) of their answers the loop of `spectrum.linear_loop` shrinks from (2 + N) N D states to
+
+    T(s) xbar = 0,  T = diag(q) + h o C,  q_a = s / k2 (order 1), s (s + k4) / (k2 k4) (order 2),
+    C_.j = (s + K3 M_j)^-1 K3 a_.j,  M_j = L + diag(a_.j).
+
+Its other modes, those of K3 M_j and -k1, decay. So what grows are the zeros of det T in the right half-plane,
+and the argument principle counts them: where det T turns by less than its degree times pi along the imaginary
+axis, it has half as many zeros there as half-turns are missing.
+
+No turn is passed over. As -K3 M_j has no negative entry beside its diagonal, exp(-K3 M_j t) >= 0, and no
+entry of (iw + K3 M_j)^-1 exceeds that of (K3 M_j)^-1 in size: |C_ij(iw)| <= C_ij(0) = 1 and
+|C_.j(iw) - C_.j(iv)| <= |w - v| (K3 M_j)^-1 |C_.j(iv)|. Steps from v to w are so short that the 1-norm of
+E(w) = T(iw) T(iv)^-1 - I stays below 1 on the way. Elimination does not raise that norm and needs no
+pivoting, so the pivots of I + E stay in the right half-plane, and their arguments add up to that of the
+determinant.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from time import monotonic
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import lu_factor
+
+from ..errors import SimulationError
+from ..game.parameters import GameParameters
+from .graph import consensus_blocks, is_connected
+from .spectrum import gradient_map, owners
+
+FloatArray = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+Answers = Callable[[float], ComplexArray]
+
+LARGEST = 250
+"""Most players: inverses and modes of all M_j are N^3 numbers each, 125 MB; 200 take some 2 s of one core."""
+
+CHANGE = 0.9
+"""Bound of the 1-norm of E over a step."""
+
+SHORTEST = 1e-12
+"""A step of this part of the whole way is too short to tell a zero from one on the imaginary axis."""
+
+
+@dataclass(frozen=True)
+class Stability:
+    """Whether a loop decays, and how that is known, in half a sentence."""
+
+    stable: bool | None  # None: not decided
+    told: str
+
+
+def stability(game: GameParameters) -> Stability:
+    """Of a loop by counting its eigenvalues with positive real parts, where that is possible."""
+    states = len(owners(game)) * (2 + game.players)
+    try:
+        count = growing_modes(game)
+    except SimulationError as error:
+        return Stability(None, f"the loop has {states:,} states, too many for its eigenvalues, and {error}")
+    if not count:
+        return Stability(stable=True, told=f"all {states:,} eigenvalues have negative real parts")
+    have = "has a positive real part" if count == 1 else "have positive real parts"
+    return Stability(stable=False, told=f"{count:,} of the {states:,} eigenvalues {have}")
+
+
+def growing_modes(game: GameParameters, *, time_limit: float = 60.0) -> int:
+    """How many eigenvalues of `linear_loop` have positive real parts; none has the real part 0.
+
+    Raises SimulationError for more than LARGEST players, a graph that is not connected, an eigenvalue that is
+    0 or imaginary to rounding, and when computing takes longer than time_limit, in s.
+    """
+    if game.players > LARGEST:
+        raise SimulationError(f"the game has {game.players} players, more than {LARGEST}")
+    if not is_connected(game.adjacency):
+        raise SimulationError("the graph is not connected: some estimates are corrected by nothing")
+    begin = monotonic()
+    loop = _ReducedLoop(game)
+    end = loop.end()
+    v, turned, step = 0.0, 0.0, end
+    matrix, change = loop.at(v)
+    while v < end:
+        try:
+            inverse = np.linalg.inv(matrix)
+        except np.linalg.LinAlgError:
+            raise _on_the_axis(v) from None
+        size = np.abs(inverse)
+        while not (change(min(v + step, end)) @ size).max() <= CHANGE:
+            step *= 0.7
+            if step < SHORTEST * end:
+                raise _on_the_axis(v)
+        v, step = min(v + step, end), 1.5 * step
+        matrix, change = loop.at(v)
+        turned += _argument(matrix @ inverse)
+        if monotonic() - begin > time_limit:
+            raise SimulationError(f"{time_limit:g} s of computing came to {v:.3g} of {end:.3g} 1/s")
+    rest = loop.own(end)
+    missing = float(np.angle(rest).sum()) + _argument(matrix / rest) - turned
+    return round(missing / np.pi)
+
+
+def _on_the_axis(w: float) -> SimulationError:
+    at = "0" if w == 0.0 else f"{w:.4g} i 1/s"
+    return SimulationError(f"an eigenvalue is {at} to rounding")
+
+
+def _argument(matrix: ComplexArray) -> float:
+    """Of the determinant of I + E in radians, the 1-norm of E below 1: exact, not up to turns."""
+    factors, _ = lu_factor(matrix)
+    return float(np.angle(np.diag(factors)).sum())
+
+
+class _ReducedLoop:
+    """T along the imaginary axis, w in 1/s; an action for each coordinate unless coordinates are alike."""
+
+    def __init__(self, game: GameParameters) -> None:
+        of = owners(game)
+        self._pairs = np.ix_(of, of)
+        self._h = gradient_map(game) if game.jacobian is None else game.jacobian
+        self._first = game.first_order[of]
+        self._k2, self._k = game.of_players("k2")[of], game.regulation[of]
+        a, k3, blocks = game.adjacency, game.of_players("k3"), consensus_blocks(game.adjacency)
+        scaled = k3[:, np.newaxis] * blocks  # K3 M_j
+        self._inverses = np.linalg.inv(scaled)
+        self._answers = (
+            _by_solving(scaled, k3[:, np.newaxis] * a) if game.directed else _by_modes(blocks, k3, a)
+        )
+
+    def own(self, w: float) -> ComplexArray:
+        """q (n,), which grows with w."""
+        s = 1j * w
+        second = s * (s + self._k) / (self._k2 * self._k)
+        return np.asarray(np.where(self._first, s / self._k2, second), dtype=np.complex128)
+
+    def at(self, v: float) -> tuple[ComplexArray, Callable[[float], FloatArray]]:
+        """T (n, n) at v, and by how much its columns' entries differ at most in sum from there to w, (n,)."""
+        answers, own = self._answers(v), self.own(v)
+        slopes = (self._inverses @ np.abs(answers)[:, :, np.newaxis])[:, :, 0].T
+        sums = (np.abs(self._h) * slopes[self._pairs]).sum(axis=0)
+
+        def change(w: float) -> FloatArray:
+            return np.asarray(np.abs(self.own(w) - own) + (w - v) * sums)
+
+        return np.diag(own) + self._h * answers.T[self._pairs], change
+
+    def end(self) -> float:
+        """Where diag(q) outweighs the rest of T so much that nothing happens beyond."""
+        weights, w = np.abs(self._h).sum(axis=0), float(self._k2.min())
+        while (weights > CHANGE * np.abs(self.own(w))).any():
+            w *= 1.1
+        return w
+
+
+def _by_modes(blocks: FloatArray, k3: FloatArray, a: FloatArray) -> Answers:
+    """C(iw)', (N, N), row j of the estimates of player j, from the modes of K3^1/2 M_j K3^1/2, symmetric."""
+    root = np.sqrt(k3)
+    rates, modes = np.linalg.eigh(root[:, np.newaxis] * blocks * root)
+    modes *= root[:, np.newaxis]
+    shares = modes * np.einsum("jik,ij->jk", modes, a)[:, np.newaxis, :]
+
+    def answers(w: float) -> ComplexArray:
+        return np.asarray((shares @ (1.0 / (1j * w + rates))[:, :, np.newaxis])[:, :, 0])
+
+    return answers
+
+
+def _by_solving(scaled: FloatArray, pull: FloatArray) -> Answers:
+    """The same of a directed graph, whose modes may be far from orthogonal."""
+    unit = np.eye(len(pull))
+
+    def answers(w: float) -> ComplexArray:
+        return np.asarray(np.linalg.solve(1j * w * unit + scaled, pull.T[:, :, np.newaxis])[:, :, 0])
+
+    return answers
