@@ -97,7 +97,7 @@ void ModelExchange::accept_step() {
     evaluation_.prepare_signals(standing());
     judge_.pass(point_.time - start_time_, path_, point_.modes);
     judge_.forget_past();
-  } else if (point_.time < point_.accepted_time) {  // the importer went back by itself
+  } else {  // the importer went back by itself, or changed the state or inputs where it stands
     judge_.jump(point_.time - start_time_, place(), point_.modes);
   }
   note_accepted();

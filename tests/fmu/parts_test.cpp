@@ -187,6 +187,24 @@ TEST_P(BehavioursOfParts, B01RollbackRepeatsBitForBitInAnyOrder) {
   for (fmi2FMUstate& state : saved) EXPECT_EQ(fmi2FreeFMUstate(slave.component, &state), fmi2OK);
 }
 
+// Inputs may change in continuous time, where the last step ended.
+TEST_P(BehavioursOfParts, B01ByModelExchangeAStepAcceptedWhereInputsChangedIsRestored) {
+  Importer importer(game());
+  importer.begin();
+  importer.integrate(0.1, 1e-2);
+  for (const std::string& name : inputs(importer)) ASSERT_EQ(importer.set(name, 0.9), fmi2OK);
+  fmi2Boolean enters = fmi2False;
+  fmi2Boolean ends = fmi2False;
+  ASSERT_EQ(fmi2CompletedIntegratorStep(importer.component, fmi2True, &enters, &ends), fmi2OK);
+  const auto bytes = importer.serialized();
+  importer.integrate(0.2, 1e-2);
+  Importer other(game());
+  ASSERT_EQ(other.deserialize_and_set(bytes), fmi2OK) << other.last_message();
+  other.time = 0.1;
+  other.integrate(0.2, 1e-2);
+  EXPECT_TRUE(same_values(other, other.all(), importer.all()));
+}
+
 TEST_P(BehavioursOfParts, B02SavingIsNeutralAndB21InstancesAreIndependent) {
   Slave plain(game());
   Slave saving(game());
