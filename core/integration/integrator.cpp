@@ -473,7 +473,8 @@ void Integrator::Implementation::restart(bool parameters_changed) {
   }
   require_usable_rates(time_, state_.data());
   restart_modes_ = modes_;
-  conditions_.pass(time_, state_.data(), inputs_at(time_), tolerances_.relative, nullptr, signals_, modes_);
+  restart_statistics_.events +=
+      conditions_.pass(time_, state_.data(), inputs_at(time_), tolerances_.relative, nullptr, signals_, modes_).events;
   if (modes_ != restart_modes_) require_usable_rates(time_, state_.data());
   restart_time_ = time_;
   restart_state_ = state_;

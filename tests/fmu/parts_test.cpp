@@ -475,6 +475,35 @@ TEST_P(BehavioursOfParts, B17MayStartAtUnixTimeAndB16EndsAtTheStopTime) {
   EXPECT_TRUE(same_values(slave, slave.all(), before));
 }
 
+// Of conditions that a change of inputs or parameters decides anew.
+TEST(EventsOfParts, CountThoseAtAChangeInBothInterfaces) {
+  std::string player = second;
+  const std::string smooth = "0.4 * sin(x[1,l])";
+  player.replace(player.find(smooth), smooth.size(), "if(x[1,l] > 0.5, 0.4, -0.4)");
+  const std::string game = game_of(line, {elsewhere_of_order_1, player.c_str(), elsewhere_of_order_1});
+  Slave slave(game);
+  slave.initialize();
+  Importer importer(game);
+  importer.begin();
+  int before = 0;
+  for (const double heard : {1.0, 0.0}) {
+    ASSERT_EQ(fmi2EnterEventMode(importer.component), fmi2OK);
+    for (Slave* one : {&slave, static_cast<Slave*>(&importer)}) {
+      for (const char* name : {"x[1,1]", "x[1,2]"}) ASSERT_EQ(one->set(name, heard), fmi2OK);
+    }
+    importer.finish_event();
+    ASSERT_EQ(slave.step(slave.get("time"), 1e-6), fmi2OK) << slave.last_message();
+    before += 2;
+    EXPECT_EQ(slave.get_integer("solver_events"), before);
+    EXPECT_EQ(importer.get_integer("solver_events"), before);
+  }
+  slave.run(1e-6 * 2.0, 0.01, 1);  // time events begin at 0.55 s
+  EXPECT_EQ(slave.get_integer("solver_events"), before);
+  ASSERT_EQ(slave.set("u_max[2,2]", 1e-3), fmi2OK);
+  ASSERT_EQ(slave.step(0.01, 1e-6), fmi2OK) << slave.last_message();
+  EXPECT_EQ(slave.get_integer("solver_events"), before + 1);
+}
+
 TEST_P(BehavioursOfParts, B20AFailedRunIsMendedByResetAndRestore) {
   Slave slave(game());
   begin_with_inputs(slave);

@@ -59,7 +59,7 @@ class Trajectory:
     nash_error: FloatArray  # (T,), 2-norm of x - x*
     switches: tuple[Switch, ...]
     rate_evaluations: int
-    bound_passages: int  # how often a control came to its bound u_max or left it, not by a change of that
+    bound_passages: int  # how often a control came to its bound u_max or left it
 
     @property
     def switch_count(self) -> int:
@@ -148,9 +148,12 @@ class _Run:
         if not np.isfinite(self.game.u_max).any():
             return
         for time in np.linspace(start, self.t, 17)[1:]:
-            at_bound = self._at_bound(interpolant(time))
-            self.bound_passages += int(np.abs(at_bound - self.at_bound).sum())
-            self.at_bound = at_bound
+            self._pass_bounds(interpolant(time))
+
+    def _pass_bounds(self, state: FloatArray) -> None:
+        at_bound = self._at_bound(state)
+        self.bound_passages += int(np.abs(at_bound - self.at_bound).sum())
+        self.at_bound = at_bound
 
     def change(self, changes: Mapping[str, ArrayLike]) -> None:
         """Apply one breakpoint and give columns that the change pushes off the sphere their inside law."""
@@ -163,7 +166,7 @@ class _Run:
                 tuned: dict[str, Any] = {name: float(new) if isinstance(old, float) else new.copy()}
                 self.game = replace(self.game, **tuned)
         self.x_star = nash_equilibrium(self.game)
-        self.at_bound = self._at_bound(self.state)
+        self._pass_bounds(self.state)
         self._switch_where(self._violation(self.state) > 0.0)
 
     def sample(self) -> dict[str, Any]:
