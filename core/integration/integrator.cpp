@@ -343,7 +343,7 @@ int Integrator::Implementation::solve(Real* b) noexcept {
 }
 
 void Integrator::Implementation::stop(Real t, const Real* state, const std::string& reason) {
-  const std::string growth = unbounded_growth(loop_, state);
+  const std::string growth = unbounded_growth(loop_, state, input_values_.data());
   throw IntegrationError("the integration stopped at t = " + absolute(t) + ": " + (growth.empty() ? reason : growth));
 }
 
@@ -372,9 +372,12 @@ void Integrator::Implementation::fail(int flag, Real t) {
     case CV_RHSFUNC_FAIL:
     case CV_FIRST_RHSFUNC_ERR:
     case CV_REPTD_RHSFUNC_ERR:
-    case CV_UNREC_RHSFUNC_ERR:
+    case CV_UNREC_RHSFUNC_ERR: {
+      const std::string after =
+          unbounded_growth(loop_, state, input_values_.data());  // where rates were asked for last
       require_usable_rates(t, state);
-      stop(t, state, "the rates are not finite just after it" + last_step);
+      stop(t, state, after.empty() ? "the rates are not finite just after it" + last_step : after + " just after it");
+    }
     default:
       std::unique_ptr<char, decltype(&std::free)> name(CVodeGetReturnFlagName(flag), &std::free);
       stop(t, state, name.get());

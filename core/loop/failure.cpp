@@ -80,17 +80,24 @@ std::string input_name(const ClosedLoop& loop, int k) {
   return indexed("xbar", {inputs.heard()[at(from_xbar / shape.dimension)], from_xbar % shape.dimension});
 }
 
-std::string unbounded_growth(const ClosedLoop& loop, const Real* state) {
+std::string unbounded_growth(const ClosedLoop& loop, const Real* state, const Real* inputs) {
   const int size = loop.layout().weights();  // the weights are bounded
   AlignedVector initial(at(loop.layout().size()));
   loop.initial_state(initial.data());
   const auto larger = [](Real a, Real b) { return std::isnan(b) || std::fabs(a) < std::fabs(b); };
-  const int k = static_cast<int>(std::max_element(state, state + size, larger) - state);
   const Real largest_at_start = std::fabs(*std::max_element(initial.begin(), initial.begin() + size, larger));
-  if (std::fabs(state[k]) <= out_of_proportion * std::max(1.0, largest_at_start)) return {};
-  const auto [name, index] = state_entry(loop, k);
+  const auto is_out_of_proportion = [&](Real value) {
+    return !(std::fabs(value) <= out_of_proportion * std::max(1.0, largest_at_start));
+  };
+  const Real* const grown = std::max_element(state, state + size, larger);
+  const Real* const told = std::max_element(inputs, inputs + loop.inputs().size(), larger);
+  if (is_out_of_proportion(*told) && !larger(*told, *grown)) {
+    return "the input " + input_name(loop, static_cast<int>(told - inputs)) + " is " + number_text(*told);
+  }
+  if (!is_out_of_proportion(*grown)) return {};
+  const auto [name, index] = state_entry(loop, static_cast<int>(grown - state));
   return "player " + std::to_string(index[0] + 1) + " grows without bound: " + indexed(name, index) + " has reached " +
-         number_text(state[k]);
+         number_text(*grown);
 }
 
 std::string unusable_rate(const ClosedLoop& loop, const Real* inputs, const Signals& signals, const Real* rate) {

@@ -15,8 +15,8 @@ std::string state_name(const ClosedLoop& loop, int k);
 std::string input_name(const ClosedLoop& loop, int k);
 
 /// Names the player whose state has grown out of all proportion to the initial state, the largest entry and its value;
-/// empty when there is none.
-std::string unbounded_growth(const ClosedLoop& loop, const Real* state);
+/// or an input that is out of proportion and no smaller; empty when there is none.
+std::string unbounded_growth(const ClosedLoop& loop, const Real* state, const Real* inputs);
 
 /// Names what makes the rates of this evaluation too large to go on with, or not finite: an input, a signal or, when it
 /// is none of these, a rate; empty when none is.

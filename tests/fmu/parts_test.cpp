@@ -504,6 +504,23 @@ TEST(EventsOfParts, CountThoseAtAChangeInBothInterfaces) {
   EXPECT_EQ(slave.get_integer("solver_events"), before + 1);
 }
 
+TEST_P(BehavioursOfParts, B20ARunThatInputsEndNamesTheFirstOfThem) {
+  Slave slave(game());
+  const auto names = inputs(slave);
+  for (const double rate : {0.0, 1e300}) {
+    begin_with_inputs(slave);
+    slave.run(0.0, 0.1, 1);
+    for (const std::string& name : names) {
+      ASSERT_EQ(slave.set(name, rate == 0.0 ? 1e30 : 0.1), fmi2OK);
+      ASSERT_EQ(slave.set_derivative(name, 3, rate), fmi2OK);
+    }
+    ASSERT_EQ(slave.step(0.1, 1.0), fmi2Error);
+    EXPECT_NE(slave.last_message().find("the input " + names.front() + " is "), std::string::npos)
+        << slave.last_message();
+    ASSERT_EQ(fmi2Reset(slave.component), fmi2OK);
+  }
+}
+
 TEST_P(BehavioursOfParts, B20AFailedRunIsMendedByResetAndRestore) {
   Slave slave(game());
   begin_with_inputs(slave);
