@@ -11,26 +11,21 @@ bool Inputs::is_constant(int input) const {
 }
 
 void Inputs::set_value(int input, Real value) {
-  const bool was_constant = is_constant(input);
+  if (!is_constant(input)) --varying_;
   std::fill_n(polynomial(input), stride, 0.0);
   polynomial(input)[0] = values_[at(input)] = value;
-  if (!was_constant) find_derivatives();
 }
 
 void Inputs::set_derivative(int input, int order, Real derivative, Real t) {
+  if (!is_constant(input)) --varying_;
   polynomial(input)[order] = derivative;
   polynomial(input)[since] = t;
-  find_derivatives();
-}
-
-void Inputs::find_derivatives() {
-  has_derivatives_ = false;
-  for (int p = 0; p < count() && !has_derivatives_; ++p) has_derivatives_ = !is_constant(p);
+  if (!is_constant(input)) ++varying_;
 }
 
 void Inputs::values(Real t, Real* value) const {
   const int n = count();
-  if (!has_derivatives_) {
+  if (are_constant()) {
     std::copy(values_.begin(), values_.end(), value);
     return;
   }
@@ -51,8 +46,11 @@ void Inputs::rates(Real t, Real* rate) const {
 
 void Inputs::set_numbers(std::span<const Real> numbers) {
   std::copy(numbers.begin(), numbers.end(), numbers_.begin());
-  for (int p = 0; p < count(); ++p) values_[at(p)] = polynomial(p)[0];
-  find_derivatives();
+  varying_ = 0;
+  for (int p = 0; p < count(); ++p) {
+    values_[at(p)] = polynomial(p)[0];
+    if (!is_constant(p)) ++varying_;
+  }
 }
 
 }  // namespace mixed_order_game

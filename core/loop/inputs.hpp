@@ -23,7 +23,7 @@ class Inputs {
   [[nodiscard]] Real value(int input) const { return polynomial(input)[0]; }
   /// Whether all its derivatives are zero.
   [[nodiscard]] bool is_constant(int input) const;
-  [[nodiscard]] bool are_constant() const { return !has_derivatives_; }
+  [[nodiscard]] bool are_constant() const { return varying_ == 0; }
   /// Sets a constant.
   void set_value(int input, Real value);
   /// Sets derivative number order >= 1 [per s^order], counted from time t on.
@@ -45,11 +45,10 @@ class Inputs {
   /// Value, derivatives, since.
   [[nodiscard]] const Real* polynomial(int input) const { return numbers_.data() + at(input) * stride; }
   [[nodiscard]] Real* polynomial(int input) { return numbers_.data() + at(input) * stride; }
-  void find_derivatives();
 
   std::vector<Real> numbers_;  // polynomial by polynomial
   std::vector<Real> values_;   // value by value
-  bool has_derivatives_ = false;
+  int varying_ = 0;            // how many have derivatives
 };
 
 }  // namespace mixed_order_game

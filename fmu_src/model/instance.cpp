@@ -254,17 +254,17 @@ void Instance::set_input_derivatives(std::span<const std::uint32_t> references, 
   const ModelVariables& variables = model_.variables;
   for (std::size_t k = 0; k < references.size(); ++k) {
     const int reference = known(references[k], Type::real);
-    const std::string name = variables.name(reference);
+    const auto derivative = [&] {
+      return "derivative " + std::to_string(orders[k]) + " of " + variables.name(reference);
+    };
     if (variables.family(reference).causality != Causality::input) {
-      throw Error(name + " is not an input, and only inputs have derivatives that can be set");
+      throw Error(variables.name(reference) + " is not an input, and only inputs have derivatives that can be set");
     }
     if (orders[k] < 1 || orders[k] > Inputs::highest_derivative) {
-      throw Error("derivative " + std::to_string(orders[k]) + " of " + name + " was set, expected an order from 1 to " +
-                  std::to_string(Inputs::highest_derivative));
+      throw Error(derivative() + " was set, expected an order from 1 to " + std::to_string(Inputs::highest_derivative));
     }
     if (!std::isfinite(values[k])) {
-      throw Error("derivative " + std::to_string(orders[k]) + " of " + name + " was set to " + text_of(values[k]) +
-                  ", expected a finite number");
+      throw Error(derivative() + " was set to " + text_of(values[k]) + ", expected a finite number");
     }
   }
   for (std::size_t k = 0; k < references.size(); ++k) {
@@ -298,13 +298,12 @@ void Instance::get_output_derivatives(std::span<const std::uint32_t> references,
   const ModelVariables& variables = model_.variables;
   for (std::size_t k = 0; k < references.size(); ++k) {
     const int reference = known(references[k], Type::real);
-    const std::string name = variables.name(reference);
     if (variables.family(reference).causality != Causality::output) {
-      throw Error(name + " is not an output, and only outputs have derivatives that can be read");
+      throw Error(variables.name(reference) + " is not an output, and only outputs have derivatives that can be read");
     }
     if (orders[k] < 1 || orders[k] > highest_output_derivative) {
-      throw Error("derivative " + std::to_string(orders[k]) + " of " + name + " was asked for, expected order " +
-                  std::to_string(highest_output_derivative));
+      throw Error("derivative " + std::to_string(orders[k]) + " of " + variables.name(reference) +
+                  " was asked for, expected order " + std::to_string(highest_output_derivative));
     }
   }
   const View source = prepare_tangent(references);
