@@ -44,6 +44,11 @@ def test_parts_move_as_the_exact_map_of_a_period(
         state = step @ state
 
 
+def test_parts_share_the_code_of_one_library() -> None:
+    with Coupled("five_vehicles") as coupled:
+        assert len({part._slave.dll._handle for part in coupled._parts}) == 1
+
+
 def test_the_longest_period_is_where_the_map_turns_unstable() -> None:
     parameters = game_parameters(mog.read_model("five_vehicles"))
     apart = [[number] for number in range(1, 6)]

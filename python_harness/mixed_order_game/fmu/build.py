@@ -314,6 +314,14 @@ def host_tool() -> Path:
     return tool
 
 
+def native_library() -> Path:
+    """The shared library of this package's FMUs on this machine. Raises BuildError if there is none."""
+    found = _binaries(native_directory(), arm_linux=False)
+    if _platform() not in found:
+        raise BuildError(f"this installation has binaries for {', '.join(found)}, but none for {_platform()}")
+    return found[_platform()]
+
+
 def _package_folders() -> Iterator[Path]:
     """Folders of the package; an editable installation has two, the sources and the compiled parts."""
     yield from map(Path, sys.modules[__package__.partition(".")[0]].__path__)

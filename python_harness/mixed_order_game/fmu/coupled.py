@@ -15,7 +15,7 @@ from ..errors import GameError, SimulationError
 from ..files.temporary import temporary_folder
 from ..game.parts import part_of_game, toml_of_game
 from ..interrupts import noted_signals
-from .build import GameSource, cached_fmu
+from .build import GameSource, cached_fmu, native_library
 from .model import Model, Value, check_value, read_model
 from .reals import Reals
 from .run import Simulator
@@ -125,6 +125,8 @@ class _Part(Simulator):
     _holds_all_players = False
 
     def __init__(self, fmu: GameSource) -> None:
+        # the one file from which all of them were made: loaded once, processors keep its code in their caches
+        self._library = native_library()
         super().__init__(fmu)
         variables = self.model.variables.values()
         self.inputs = [

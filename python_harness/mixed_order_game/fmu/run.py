@@ -189,6 +189,8 @@ class Simulator:
     """
 
     _holds_all_players = True
+    _library: Path | None = None
+    """Shared library to load in place of the FMU's own."""
 
     def __init__(self, fmu: GameSource = None) -> None:
         self.model: Model = read_model(fmu)
@@ -224,6 +226,7 @@ class Simulator:
                     modelIdentifier="MixedOrderGame",
                     unzipDirectory=str(folder),
                     instanceName="mixed_order_game",
+                    libraryPath=None if self._library is None else str(self._library),
                 )
             slave.instantiate(callbacks=self._callbacks)
             self._slave = slave
