@@ -88,9 +88,9 @@ class CommunicationGraph:
             raise GraphError(f"the graph has {self.players} players, the game has {model.players}")
         if self.directed and not model.directed:
             raise GraphError("the graph is directed, and that of the game is not")
-        weights = {(i, j): weight for i, j, weight in self.edges}
+        weights: dict[tuple[int, ...], float] = {(i, j): weight for i, j, weight in self.edges}
         if model.directed:
-            heard = {(j, i): weight for (i, j), weight in weights.items()}
+            heard: dict[tuple[int, ...], float] = {(j, i): weight for (i, j), weight in weights.items()}
             weights = heard if self.directed else weights | heard
         return edge_values(model, weights)
 
