@@ -179,8 +179,10 @@ def test_verdicts(vehicles: Simulator, tmp_path: Path) -> None:
     game.write_text(new_game(Recipe(31, 1, graph="ring")), encoding="utf-8")
     with Simulator(build_fmu(game, tmp_path / "many.fmu")) as simulator:
         large = spectrum_of(simulator, {})
-        assert (large.verdict, len(large.eigenvalues)) == ("not computed", 0)
-        assert "1,023 states" in large.reason
+        assert (large.verdict, len(large.eigenvalues)) == ("stable", 0)
+        told = "All 1,023 eigenvalues have negative real parts; they are too many to be drawn."
+        assert large.reason == told
+        assert spectrum_of(simulator, {"k3": 0.01}).verdict == "unstable"
 
 
 DIFFERENT = """

@@ -7,19 +7,23 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import MixedOrderGameError, SimulationError
+from ..errors import MixedOrderGameError
 from ..fmu.model import Value
 from ..fmu.run import Simulator
 from ..game.definition import has_expressions
 from ..game.parameters import GameParameters, game_parameters
 from ..theory.exact_loop import LARGEST_LINEAR_LOOP
 from ..theory.graph import is_connected
+from ..theory.growing_modes import stability
 from ..theory.linearized import linearized_loop
 from ..theory.spectrum import linear_loop
 
 FloatArray = NDArray[np.float64]
 
 STABLE, UNSTABLE, NOT_DECIDED, NOT_COMPUTED = "stable", "unstable", "not decided", "not computed"
+
+PATIENCE = 10.0
+"""Time in s that eigenvalues of a large loop may be counted for."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,25 +49,31 @@ def spectrum_of(simulator: Simulator, changes: Mapping[str, Value]) -> Spectrum:
 
     What the FMU refuses, and a loop that is too large, is the reason of one that is not computed.
     """
-    local = has_expressions(simulator.model.expressions, "cost") is not None
+    near = "" if has_expressions(simulator.model.expressions, "cost") is None else " near x*"
     try:
-        game = game_parameters(simulator.model, changes)
-        matrix = linearized_loop(simulator, changes).matrix if local else _linear_loop(game)
+        if near:
+            loop = linearized_loop(simulator, changes)
+            game, is_large = loop.game, loop.is_large
+        else:
+            game = game_parameters(simulator.model, changes)
+            is_large = game.players > LARGEST_LINEAR_LOOP
     except MixedOrderGameError as error:
         return Spectrum(np.empty(0, dtype=complex), NOT_COMPUTED, f"{error}.")
+    if is_large:
+        return _counted(game, near)
+    matrix = linear_loop(game)
     eigenvalues = np.linalg.eigvals(matrix).astype(complex)
     rounding = len(matrix) * float(np.finfo(float).eps) * float(np.abs(matrix).max())
-    verdict, reason = _judged(
-        float(eigenvalues.real.max()), rounding, is_connected(game.adjacency), " near x*" if local else ""
-    )
+    verdict, reason = _judged(float(eigenvalues.real.max()), rounding, is_connected(game.adjacency), near)
     return Spectrum(eigenvalues, verdict, reason)
 
 
-def _linear_loop(game: GameParameters) -> FloatArray:
-    if game.players > LARGEST_LINEAR_LOOP:
-        states = 2 * game.players + game.players**2
-        raise SimulationError(f"the loop has {states:,} states a coordinate, too many for its eigenvalues")
-    return linear_loop(game)
+def _counted(game: GameParameters, near: str) -> Spectrum:
+    """Of a large loop: no eigenvalues, but whether some have positive real parts."""
+    judged = stability(game, time_limit=PATIENCE)
+    verdict = {True: STABLE, False: UNSTABLE, None: NOT_COMPUTED}[judged.stable]
+    drawn = "" if judged.stable is None else f"{near}; they are too many to be drawn"
+    return Spectrum(np.empty(0, dtype=complex), verdict, f"{judged.told[0].upper()}{judged.told[1:]}{drawn}.")
 
 
 def _judged(abscissa: float, rounding: float, connected: bool, near: str) -> tuple[str, str]:  # noqa: FBT001

@@ -53,11 +53,14 @@ class Stability:
     told: str
 
 
-def stability(game: GameParameters) -> Stability:
-    """Of a loop by counting its eigenvalues with positive real parts, where that is possible."""
+def stability(game: GameParameters, *, time_limit: float = 60.0) -> Stability:
+    """Of a loop by counting its eigenvalues with positive real parts, where that is possible.
+
+    time_limit in s of computing.
+    """
     states = len(owners(game)) * (2 + game.players)
     try:
-        count = growing_modes(game)
+        count = growing_modes(game, time_limit=time_limit)
     except SimulationError as error:
         return Stability(None, f"the loop has {states:,} states, too many for its eigenvalues, and {error}")
     if not count:
