@@ -311,7 +311,10 @@ Real Judge::energy(const Step& step, const std::array<Real, 3>& t, const std::ar
   const Real whole = h / 6.0 * (power[0] + 4.0 * power[1] + power[2]);
   const Real halves = h / 12.0 * (power[0] + 4.0 * power_left + 2.0 * power[1] + 4.0 * power_right + power[2]);
   const Real difference = halves - whole;
-  if (halvings == 0 || std::fabs(difference) <= 15.0 * tolerance) return halves + difference / 15.0;
+  // halves of what is out of range are no better
+  if (halvings == 0 || !std::isfinite(difference) || !(std::fabs(difference) > 15.0 * tolerance)) {
+    return halves + difference / 15.0;
+  }
   return energy(step, {t[0], left, t[1]}, {power[0], power_left, power[1]}, 0.5 * tolerance, halvings - 1) +
          energy(step, {t[1], right, t[2]}, {power[1], power_right, power[2]}, 0.5 * tolerance, halvings - 1);
 }
