@@ -167,7 +167,7 @@ def test_no_place_for_temporary_files(fmu: Path, tmp_path: Path, monkeypatch: py
 @pytest.mark.parametrize("name", sorted(build.shipped_games()))
 def test_games_of_the_package(name: str, tmp_path: Path) -> None:
     assert read_model(build_fmu(build.shipped_game(name), tmp_path / f"{name}.fmu")).title
-    with pytest.raises(GameError, match=f"there is no game {name}s; those that come with the package are"):
+    with pytest.raises(GameError, match=f"there is no game {name}s; did you mean {name}"):
         build.shipped_game(f"{name}s")
 
 

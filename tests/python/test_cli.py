@@ -130,6 +130,29 @@ def test_files_that_are_no_games(command: str, tmp_path: Path) -> None:
     sentence(mog(command, tmp_path / "bad.toml"))
 
 
+@pytest.mark.parametrize("command", ["run", "build", "check", "analyse", "plot", "compare", "report"])
+def test_what_was_meant_by_a_name(command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of a file without a suffix, one that is missing and a game of the package."""
+    monkeypatch.chdir(tmp_path)
+    Path("mine").write_text("text")
+    Path("mine.toml").write_text("text")
+    told = sentence(mog(command, "mine"))
+    assert told.startswith("mog: mine is a file without a suffix, expected ")
+    assert told.endswith("or the name of a game of the package; did you mean mine.toml?\n")
+    fmu, result = command not in ("build", "check"), command in ("plot", "compare", "report")
+    assert ("an FMU (.fmu)" in told, "a result (.parquet, .csv)" in told) == (fmu, result)
+    assert sentence(mog(command, "five_vehicle")).startswith(
+        "mog: there is no game five_vehicle; did you mean five_vehicles"
+    )
+    assert (
+        sentence(mog(command, "min.toml")) == "mog: there is no game file min.toml; did you mean mine.toml?\n"
+    )
+    if result:
+        Path("run.csv").write_text("text")
+        assert sentence(mog(command, "run")) == "mog: there is no game run; did you mean run.csv?\n"
+        assert sentence(mog(command, "runs.csv")).endswith("result file runs.csv; did you mean run.csv?\n")
+
+
 def test_build(fmu: Path, tmp_path: Path) -> None:
     output = tmp_path / "built.fmu"
     result = mog("build", default_game(), "--output", output)
@@ -141,7 +164,10 @@ def test_build(fmu: Path, tmp_path: Path) -> None:
     assert not (tmp_path / "bad.fmu").exists()
     for command, options in (("build", ["--output", tmp_path / "bad.fmu"]), ("check", [])):
         told = sentence(mog(command, fmu, *options))
-        assert told == f"mog: {fmu} is an FMU, expected a game file (.toml)\n"
+        assert (
+            told
+            == f"mog: {fmu} is an FMU, expected a game file (.toml) or the name of a game of the package\n"
+        )
 
 
 def test_info(fmu: Path) -> None:

@@ -4,6 +4,7 @@ A byte order mark at the beginning of a text means nothing, as in the FMU's own 
 """
 
 import csv
+import difflib
 import io
 import re
 import stat
@@ -35,11 +36,21 @@ def expect_file(path: Path, what: str, error: type[MixedOrderGameError]) -> None
             path.open("rb").close()
             return
     except (FileNotFoundError, NotADirectoryError, ValueError):  # ValueError: no file can have this name
-        raise missing(error)(f"there is no {what} {path}") from None
+        raise missing(error)(f"there is no {what} {path}{_with_a_near_name(path)}") from None
     except OSError as found:
         raise error(f"{path} cannot be read: {reason(found)}") from found
     kind = "a folder" if stat.S_ISDIR(mode) else "not a regular file"
     raise error(f"{path} is {kind}, expected {'an' if what == 'FMU' else 'a'} {what}")
+
+
+def _with_a_near_name(path: Path) -> str:
+    """Files of that kind beside one that is missing, as the end of a sentence; empty where no name is near."""
+    try:
+        names = [each.name for each in path.parent.iterdir() if suffix_of(each) == suffix_of(path)]
+    except (OSError, ValueError):
+        return ""
+    near = difflib.get_close_matches(path.name, names, n=3)
+    return f"; did you mean {' or '.join(str(path.with_name(name)) for name in near)}?" if near else ""
 
 
 def text_of(content: bytes) -> str:

@@ -5,10 +5,12 @@ tools/<platform>/ with mixed-order-game-description (the host tool), binaries/<p
 licenses/ and model.png, for this machine's platform or for all of them; in its folder `games` the game files.
 """
 
+import difflib
 import hashlib
 import logging
 import os
 import platform
+import re
 import shutil
 import subprocess
 import sys
@@ -30,9 +32,10 @@ logger = logging.getLogger(__name__)
 DEFAULT_GAME = "five_vehicles"
 """The paper's example."""
 
-GAME_FILE = "a game file (.toml)"
-SOURCE = f"an FMU (.fmu) or {GAME_FILE}"
-SOURCE_OR_RESULT = f"an FMU (.fmu), {GAME_FILE} or a result (.parquet, .csv)"
+BY_NAME = "the name of a game of the package"
+GAME = f"a game file (.toml) or {BY_NAME}"
+SOURCE = f"an FMU (.fmu), {GAME}"
+SOURCE_OR_RESULT = f"an FMU (.fmu), a result (.parquet, .csv), {GAME}"
 
 TOOL = "mixed-order-game-description"
 ARM_LINUX = "aarch64-linux"
@@ -243,12 +246,23 @@ def shipped_game(name: str) -> Path:
 
     Raises GameError if there is no such game, BuildError if this installation carries none at all.
     """
+    return _by_name(name, SOURCE)
+
+
+def _by_name(name: str, expected: str) -> Path:
     games = shipped_games()
     if name not in games:
-        raise MissingGameError(
-            f"there is no game {name}; those that come with the package are {', '.join(games)}"
-        )
+        known = f"; those that come with the package are {', '.join(games)}"
+        raise MissingGameError(f"there is no game {name}{_nearest(name, expected) or known}")
     return games[name]
+
+
+def _nearest(name: str, expected: str) -> str:
+    """The end of a sentence: files of this name with a suffix that is expected, and the nearest games."""
+    files = [f"{name}{suffix}" for suffix in re.findall(r"\.\w+", expected)]
+    found = [file for file in files if os.path.isfile(file)]  # noqa: PTH113 - never raises
+    found += difflib.get_close_matches(name.lower(), shipped_games(), n=3)
+    return f"; did you mean {' or '.join(found)}?" if found else ""
 
 
 def shipped_games() -> dict[str, Path]:
@@ -274,18 +288,23 @@ def source_of(game: GameSource, expected: str = SOURCE) -> Path:
     path = Path(game)
     if suffix_of(path) in (".fmu", ".toml"):
         return path
+    if str(path) in shipped_games():
+        return shipped_game(str(path))
+    if os.path.isdir(path):  # noqa: PTH112 - never raises, here as below
+        raise GameError(f"{path} is a folder, expected {expected}")
     if path.suffix:
         raise GameError(f"{path} ends in {path.suffix}, expected {expected}")
-    if str(path) not in shipped_games() and os.path.exists(path):  # noqa: PTH110 - never raises
-        raise GameError(f"{path} has no suffix, expected {expected}")
-    return shipped_game(str(path))
+    if os.path.exists(path):  # noqa: PTH110
+        nearest = _nearest(str(path), expected)
+        raise GameError(f"{path} is a file without a suffix, expected {expected}{nearest}")
+    return _by_name(str(path), expected)
 
 
 def game_file(game: GameSource) -> Path:
     """The game file meant, as source_of does. Raises GameError for an FMU as well."""
-    path = source_of(game, GAME_FILE)
+    path = source_of(game, GAME)
     if suffix_of(path) == ".fmu":
-        raise GameError(f"{path} is an FMU, expected {GAME_FILE}")
+        raise GameError(f"{path} is an FMU, expected {GAME}")
     return path
 
 
