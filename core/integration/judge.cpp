@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 namespace mixed_order_game {
@@ -18,6 +19,9 @@ constexpr Real least_part = 0.25;
 constexpr Real energy_tolerance = 1e-4;
 constexpr Real total_tolerance = 1e-9;
 constexpr int most_halvings = 12;
+
+// An integral that is too large for a number is the largest one, which a saved state may hold.
+constexpr Real beyond_range = std::numeric_limits<Real>::max();
 
 /// Second divided difference of a function at three points: half its curvature.
 class HalfCurvature {
@@ -98,7 +102,7 @@ Judge::Judge(const ClosedLoop& loop) : loop_(loop), signals_(loop.shape()) {
   for (Node* node : {&noted_, &middle_, &between_, &end_}) give_room(*node);
 }
 
-bool Judge::is_usable(const Node& node) { return std::isfinite(node.power) && std::isfinite(node.square); }
+bool Judge::is_usable(const Node& node) { return std::isfinite(node.power); }
 
 void Judge::look_at_control(Node& node) {
   loop_.evaluate_control(signals_);
@@ -203,10 +207,10 @@ bool Judge::is_outside(Real square, const Judgement& judgement) {
 
 /// What one point alone tells of peaks. No entry is larger than the norm.
 void Judge::observe(const Node& node, Judgement& judgement) {
-  if (node.power > squared(judgement.control_peak)) {
+  if (!std::isfinite(node.power) || node.power > squared(judgement.control_peak)) {
     for (const Real u : node.control) judgement.control_peak = std::max(judgement.control_peak, std::fabs(u));
   }
-  if (node.square <= squared(error_record(node.t, judgement))) return;
+  if (std::isfinite(node.square) && node.square <= squared(error_record(node.t, judgement))) return;
   for (std::size_t p = 0; p < node.deviation.size(); ++p) {
     const Real side = judgement.side[p];
     const Real size = std::fabs(node.deviation[p]);
@@ -236,9 +240,14 @@ Judgement Judge::up_to(Real t, const Path& path, const Modes& modes) {
 }
 
 void Judge::go_on(Node& end, const Path& path, const Modes& modes, Judgement& judgement) {
-  if (!is_usable(end)) return;
+  if (std::isnan(end.power) || std::isnan(end.square)) return;
   judgement.until = end.t;
   observe(end, judgement);
+  if (!is_usable(end)) {
+    judgement.control_energy = beyond_range;
+    judgement.outside = is_outside(end.square, judgement);
+    return;
+  }
   if (count_ == 0) return;
   const Node& begin = node(0);
   const Real h = end.t - begin.t;
@@ -297,7 +306,7 @@ void Judge::add_energy(const Step& step, Judgement& judgement) {
     integral = energy(step, {a, m, b}, {fa, fm, fb}, tolerance, most_halvings);
   }
   const Real sum = judgement.control_energy + std::max(integral, 0.0);
-  if (std::isfinite(sum)) judgement.control_energy = sum;
+  judgement.control_energy = std::isfinite(sum) ? sum : beyond_range;
 }
 
 /// Simpson's rule on [t0, t2], and on halves of it where the two differ by more than the tolerance allows.

@@ -34,11 +34,6 @@ std::string groups(const CommunicationGraph& graph) {
   return text;
 }
 
-void require_finite(Real value, const std::string& name) {
-  if (std::isfinite(value)) return;
-  throw Error(name + " is not finite (" + text_of(value) + "): the parameters or initial values are too large");
-}
-
 void require_length(std::size_t length, const char* what, std::size_t expected) {
   if (length == expected) return;
   throw Error("there are " + std::to_string(length) + " " + what + ", expected " + std::to_string(expected));
@@ -181,9 +176,20 @@ void Instance::get(Type type, std::span<const std::uint32_t> references, Real* v
     scratch_[k] = variables.read(reference, source);
     if (std::isfinite(scratch_[k])) continue;
     if (model_exchange_) throw NotComputable(variables.name(reference) + " is not finite");
-    require_finite(scratch_[k], variables.name(reference));
+    refuse_value(scratch_[k], variables.name(reference));
   }
   std::copy(scratch_.begin(), scratch_.end(), values);
+}
+
+/// Says why a value is not finite.
+void Instance::refuse_value(Real value, const std::string& name) const {
+  const std::string told = name + " is not finite (" + (std::isnan(value) ? "nan" : text_of(value)) + ")";
+  if (!co_simulation_)
+    throw Error(told + ": the parameters or initial values are too large, or it is not defined there");
+  const Standing standing = co_simulation_->standing();
+  const std::string growth = unbounded_growth(evaluation_.loop(), standing.state);
+  throw Error(told + " at t = " + number_text(standing.time, 15) +
+              " s: " + (growth.empty() ? "it is not defined, or too large, for the values reached" : growth));
 }
 
 void Instance::set(Type type, std::span<const std::uint32_t> references, const Real* values) {

@@ -92,6 +92,7 @@ class Instance {
   [[nodiscard]] int known(std::uint32_t reference, Type type) const;
   [[noreturn]] void refuse(std::uint32_t reference, Type type) const;
   const Stages& stages_of(Type type, std::span<const std::uint32_t> references);
+  [[noreturn]] void refuse_value(Real value, const std::string& name) const;
   [[nodiscard]] Standing standing() const;
   [[nodiscard]] Tolerances tolerances() const;
   void act();
