@@ -187,6 +187,59 @@ def test_actions_that_escape(tmp_path: Path) -> None:
     assert named(validation)["theorem_2_convergence"].verdict is Verdict.HOLDS
 
 
+def expressions(players: int, cost: str, dynamics: str, disturbance: str, start: float) -> str:
+    """A game of players of order 1 and 2 in turn, each of whom hears the next; all start at one point."""
+    text = new_game(Recipe(players, 1, orders="first", graph="ring" if players > 2 else "path"))
+    head = text[: text.index("[[player]]")]
+    head += f"""
+[defaults]
+x0 = {start}
+y0 = "x0"
+cost = {{ expression = "{cost}" }}
+dynamics = {{ expression = "{dynamics}" }}
+disturbance = {{ expression = "{disturbance}" }}
+"""
+    for i in range(players):
+        order = f"order = 1\nz0 = {start}" if i % 2 == 0 else "order = 2"
+        head += f"[[player]]\nname = 'player {i + 1}'\n{order}\n"
+    return re.sub(r"k1 = .*\nk2 = .*\nk3 = .*\nk4 = .*", "k1 = 10.0\nk2 = 1.0\nk3 = 50.0\nk4 = 50.0", head)
+
+
+@pytest.mark.parametrize(
+    ("dynamics", "start", "told"),
+    [
+        ("x[i]^3", 8.0, r"^The run ended after 0\.00\d+ s, [\d.e+]+ from x\* after a start at .*: x\["),
+        (
+            "if(i == 2, v[2]^2 + 200.0 * x[2]^2, 0)",
+            -6.0,
+            r"^The run ended after [\d.]+ s, \|v\| or \|z\| at [\d.]+e\+\d+: .*: v\[",
+        ),
+    ],
+)
+def test_an_escape_within_one_sample(dynamics: str, start: float, told: str, tmp_path: Path) -> None:
+    claim = named(validate(built(expressions(2, "(x[i] - i)^2", dynamics, "0", start), tmp_path)))
+    assert claim["practical_convergence_actions"].verdict is Verdict.FAILS
+    assert re.match(told, claim["practical_convergence_actions"].reason)
+
+
+def test_what_grows_for_ever_is_not_run_to_the_limit(tmp_path: Path) -> None:
+    growing = expressions(2, "(x[i] - i)^2", "0.1 * x[i]", "exp(t)", 1.0)
+    claim = named(validate(built(growing, tmp_path)))["practical_convergence_actions"]
+    assert claim.verdict is Verdict.FAILS
+    assert re.search(r"grows from window to window: .* by \d\d\.?\d* s\.$", claim.reason)
+
+
+def test_what_comes_back_from_far_away_is_run_to_its_end(tmp_path: Path) -> None:
+    """Each player drives the one before, and nothing decays until all has passed through: 1e13 first."""
+    cost = "0.5 * x[i]^2 + if(i < N, -200 * x[i] * x[min(i + 1, N)], 0)"
+    validation = validate(built(expressions(7, cost, "0", "sin(t)", 1.0), tmp_path))
+    claims = named(validation)
+    assert claims["practical_convergence_actions"].verdict is Verdict.HOLDS
+    assert claims["theorem_2_convergence"].verdict is Verdict.NOT_COVERED
+    assert validation.robust is not None
+    assert validation.robust.largest_error() > 1e12
+
+
 def test_a_start_at_the_equilibrium(tmp_path: Path) -> None:
     text = re.sub(
         r"x0 = .*", "x0 = -0.5\nz0 = -0.5\ny0 = [-0.5, -0.5, -0.5, -0.5, -0.5]", default_game().read_text()

@@ -44,7 +44,7 @@ def expect_file(path: Path, what: str, error: type[MixedOrderGameError]) -> None
 
 
 def _with_a_near_name(path: Path) -> str:
-    """Files of that kind beside one that is missing, as the end of a sentence; empty where no name is near."""
+    """The nearest names beside a missing file, as the end of a sentence; empty where none is near."""
     try:
         names = [each.name for each in path.parent.iterdir() if suffix_of(each) == suffix_of(path)]
     except (OSError, ValueError):

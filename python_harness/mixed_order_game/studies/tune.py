@@ -159,7 +159,8 @@ class Tuned:
             )
         before, after = self.start_final_error, self.final_error
         if after > WORSE * before:
-            told = f"the final error {after:.4g} is {after / before:.3g} times that before, {before:.4g}"
+            times = f"{after / before:.3g} times" if before > 0.0 else "beyond"
+            told = f"the final error {after:.4g} is {times} that before, {before:.4g}"
             notes.append(told + ("" if self.largest_error else "; a largest error can be wished"))
         peak = max((found.control_peak for found in self.metrics if found is not None), default=0.0)
         if peak >= self.least_bound * (1.0 - ROUNDING):

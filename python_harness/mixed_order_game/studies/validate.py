@@ -14,7 +14,7 @@ from ..extras import need
 from ..fmu.build import GameSource
 from ..fmu.estimates import fmu_with_estimates
 from ..fmu.model import Model
-from ..fmu.run import Progress, Simulator
+from ..fmu.run import Simulator
 from ..game.definition import has_expressions
 from ..game.parameters import GameParameters, game_parameters
 from ..notebook import page, paragraph, table
@@ -260,21 +260,20 @@ def _default_experiment(
 ) -> Result | Ended:
     model = simulator.model
 
-    def run(stop: float, follow: Progress) -> Result:
-        return simulator.run(
-            start_values={"robust": True, "perturbed": True},
-            stop_time=stop,
-            step=model.step,
-            tolerance=TOLERANCE,
-            progress=follow,
-            fine_start=True,
-        )
-
     def report(time: float) -> None:
         if progress is not None:
             progress("default", time / model.stop_time)
 
-    return run_or_end(run, game, model.stop_time, report)
+    return run_or_end(
+        simulator,
+        game,
+        start_values={"robust": True, "perturbed": True},
+        stop_time=model.stop_time,
+        step=model.step,
+        tolerance=TOLERANCE,
+        fine_start=True,
+        progress=report,
+    )
 
 
 def _practical_despite(game: GameParameters, stability: Claim, convergence: Claim) -> list[Claim]:

@@ -101,17 +101,16 @@ def perturbed_run(
         else {f"epsilon[{i}]": float(width) for i, width in enumerate(epsilon, start=1)}
     )
 
-    def run(stop: float, follow: Progress) -> Result:
-        return simulator.run(
-            start_values={"robust": True, "perturbed": True, **widths},
-            stop_time=stop,
-            step=step,
-            tolerance=TOLERANCE,
-            outputs=recorded,
-            progress=follow,
-        )
-
-    result = run_or_end(run, game, stop_time, progress)
+    result = run_or_end(
+        simulator,
+        game,
+        start_values={"robust": True, "perturbed": True, **widths},
+        stop_time=stop_time,
+        step=step,
+        tolerance=TOLERANCE,
+        outputs=recorded,
+        progress=progress,
+    )
     if isinstance(result, Ended):
         return result
     return _measured(result, game, window_of(stop_time, least_window))

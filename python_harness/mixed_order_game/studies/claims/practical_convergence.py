@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ...fmu.model import Value
 from ...fmu.run import Simulator
 from ...game.parameters import GameParameters, OfPlayers
-from .early_end import Ended
+from .early_end import GONE, Ended, size_of_actions
 from .perturbed_run import PerturbedRun, disturbance_periods, perturbed_run, sample_step
 from .seeking_error import layer_slope
 from .settling import AGREEMENT, SHORTEST, Maxima, horizons, least_window
@@ -73,7 +73,7 @@ def observe(
     limit: float,
     progress: Report | None = None,
 ) -> Observed:
-    """Run until settled or the limit, in s, is reached. slowest_rate: of the unperturbed loop, in 1/s."""
+    """Run until settled or gone, or the limit in s. slowest_rate: of the unperturbed loop, in 1/s."""
     values = simulator.model.start_values()
     periods = disturbance_periods(values, game)
     window = least_window(slowest_rate, periods)
@@ -98,7 +98,9 @@ def observe(
     for stop in horizons(window, limit):
         own = run("robust", game.epsilon, stop)
         seen = Observed(game, limit, window, dominates, own, None)
-        if isinstance(own, Ended):
+        if isinstance(own, Ended) or (
+            own.actions.grow and own.actions.largest > GONE * size_of_actions(game)
+        ):
             break
         ready = own.actions.agree and own.residual.agree and SHORTEST * window <= stop
         if not ready or (not own.settled and stop < limit):

@@ -12,14 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...fmu.model import Model
-from ...fmu.run import Progress, Simulator
+from ...fmu.run import Simulator
 from ...game.definition import has_expressions
 from ...game.parameters import GameParameters
 from ...results.result import Result
 from ...theory.growing_modes import Stability, stability
 from ...theory.spectrum import consensus_rate, linear_loop, monotonicity_constant, predicted_deviation
-from .early_end import Ended, run_or_end
-from .settling import EXTENSION, TIME_CONSTANTS, window_maxima, window_of
+from .early_end import GONE, Ended, run_or_end, size_of_actions
+from .settling import EXTENSION, TIME_CONSTANTS, Maxima, window_maxima, window_of
 from .tolerances import PLAIN_TOLERANCE
 from .verdict import Claim, Verdict
 
@@ -145,20 +145,19 @@ def unperturbed_run(
     if stop_time is None:
         stop_time = _stop_time(simulator.model, spectrum)
 
-    def run(stop: float, follow: Progress) -> Result:
-        return simulator.run(
-            start_values={"robust": False, "perturbed": False},
-            stop_time=stop,
-            step=stop_time / INTERVALS,
-            tolerance=PLAIN_TOLERANCE,
-            progress=follow,
-        )
-
     def report(time: float) -> None:
         if progress is not None:
             progress("unperturbed", time / stop_time)
 
-    return run_or_end(run, game, stop_time, report)
+    return run_or_end(
+        simulator,
+        game,
+        start_values={"robust": False, "perturbed": False},
+        stop_time=stop_time,
+        step=stop_time / INTERVALS,
+        tolerance=PLAIN_TOLERANCE,
+        progress=report,
+    )
 
 
 def _stop_time(model: Model, spectrum: Spectrum) -> float:
@@ -219,13 +218,14 @@ def run_until_decay_is_seen(
 ) -> tuple[Result | Ended, Spectrum]:
     """For a loop without a known spectrum: the run, and the spectrum with the slowest rate that it shows.
 
-    The run lasts the FMU's default experiment, or longer up to the limit in s until a rate is seen.
+    The run lasts the FMU's default experiment, or longer up to the limit in s until a rate is seen, or until
+    it has gone.
     """
     stop = simulator.model.stop_time
     while True:
         run = unperturbed_run(simulator, game, spectrum, stop_time=stop, progress=progress)
         rate = slowest_rate_seen(run)
-        if rate > 0.0 or isinstance(run, Ended) or stop >= limit:
+        if rate > 0.0 or isinstance(run, Ended) or stop >= limit or _has_gone(run, game):
             return run, replace(spectrum, slowest_rate=rate)
         stop = min(EXTENSION * stop, limit)
 
@@ -254,11 +254,22 @@ def _floor(run: Result) -> float:
     return RESOLVED * PLAIN_TOLERANCE * (float(np.abs(run.x).max()) + 0.01)
 
 
+def _last_windows(run: Result) -> Maxima:
+    """Of the largest |x - x*|."""
+    error = np.abs(run.x - run.x_star).max(axis=(1, 2))
+    return window_maxima(run.time, error, window_of(float(run.time[-1]), 0.0), _floor(run))
+
+
+def _has_gone(run: Result, game: GameParameters) -> bool:
+    last = _last_windows(run)
+    return last.grow and last.largest > GONE * size_of_actions(game)
+
+
 def _seen(run: Result, why: str) -> tuple[Verdict, str]:
     """Of a loop without an exact solution; why in half a sentence."""
-    error = np.abs(run.x - run.x_star).max(axis=(1, 2))
-    last = window_maxima(run.time, error, window_of(float(run.time[-1]), 0.0), _floor(run))
+    last = _last_windows(run)
     if last.grow:
         return Verdict.FAILS, f"The largest |x - x*| grows from window to window: {last}."
+    error = np.abs(run.x - run.x_star).max(axis=(1, 2))
     told = f"the run goes from {error[0]:.3g} to {error[-1]:.3g} from x* in {run.time[-1]:.4g} s"
     return Verdict.NOT_COVERED, f"There is no exact solution to compare with, as {why}; {told}."
