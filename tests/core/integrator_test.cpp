@@ -350,6 +350,39 @@ TEST(Integrator, FollowsInputsThatChangeAgainAndAgain) {
   }
 }
 
+/// Largest error of actions, references and estimates after a second of changes every 20 ms, in tolerances.
+Real error_after_changes(const std::string& toml, Real tolerance) {
+  Simulation run(toml);
+  Simulation exact(toml);
+  run.integrator.start(0.0, {tolerance, 0.01 * tolerance});
+  exact.integrator.start(0.0, {1e-11, 1e-13});
+  Real largest = 0.0;
+  for (int k = 1; k <= 50; ++k) {
+    for (Simulation* each : {&run, &exact}) {
+      if (k > 1) push(*each, k);
+      each->integrator.advance(0.02 * k);
+    }
+    for (int p = 0; p < run.loop.layout().weights(); ++p) {
+      const Real x = exact.state()[at(p)];
+      largest = testing::larger(largest, std::fabs(run.state()[at(p)] - x) / (std::fabs(x) + 0.01));
+    }
+  }
+  return largest / tolerance;
+}
+
+/// Where starts of CVODE come in, hundreds of tolerances are left.
+TEST(Integrator, ErrorAfterChangesFallsWithTheTolerance) {
+  const auto recipes = testing::assorted_recipes();
+  for (const std::size_t number : {1UL, 3UL, 14UL}) {
+    const std::string game = toml_of(testing::random_game(recipes[number]));
+    for (const Real tolerance : {1e-3, 1e-5}) {
+      EXPECT_LE(error_after_changes(game, tolerance), 50.0) << number << " at " << tolerance;
+    }
+  }
+  const std::string game = toml_of(testing::random_game(recipes[3]));
+  for (const Real tolerance : {1e-6, 1e-7}) EXPECT_LE(error_after_changes(game, tolerance), 60.0) << tolerance;
+}
+
 TEST(Integrator, RestoresCheckpointsBetweenChangesBitForBit) {
   const Tolerances tolerances{1e-6, 1e-8};
   for (const std::string& game : {paper_game, busy_game, switching_game}) {
