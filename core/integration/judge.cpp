@@ -292,7 +292,12 @@ void Judge::add_energy(const Step& step, Judgement& judgement) {
   const Real fb = step.end->power;
   const Real fr = step.third->power;
   const std::array<Real, 5>& difference = step.end->differences;
-  Real last = -cube * (step.third == &middle_ ? HalfCurvature(a, b, m)(fa, fb, fr) : difference[2]);
+  Real last = 0.0;
+  if (step.third != &middle_) {
+    last = -cube * difference[2];
+  } else if (a < m && m < b) {  // not of a step as short as the resolution of time
+    last = -cube * HalfCurvature(a, b, m)(fa, fb, fr);
+  }
   Real integral = 0.5 * h * (fa + fb) + last;
   if (step.third != &middle_) {
     if (count_ > 2) integral += last = -cube * (m - node(1).t) * difference[3];

@@ -64,5 +64,17 @@ TEST(Judge, KnowsWhatIsTooLargeToBeSquared) {
   }
 }
 
+TEST(Judge, TakesAStepAsShortAsTheResolutionOfTime) {
+  const ClosedLoop loop = loop_of_two();
+  const AlignedVector state(at(loop.layout().size()), 1.0);
+  const AlignedVector inputs(at(loop.inputs().size()));
+  const Judge::Path path = [&](Real) { return Judge::Place{state.data(), inputs.data()}; };
+  const Modes modes(at(loop.shape().own_entries()), 0);
+  Judge judge(loop);
+  judge.start(0.75, {}, path(0.75), modes);
+  judge.pass(std::nextafter(0.75, 1.0), path, modes);
+  EXPECT_LT(judge.judgement().control_energy, 1e-10);
+}
+
 }  // namespace
 }  // namespace mixed_order_game
