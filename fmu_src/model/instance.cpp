@@ -187,7 +187,7 @@ void Instance::refuse_value(Real value, const std::string& name) const {
   if (!co_simulation_)
     throw Error(told + ": the parameters or initial values are too large, or it is not defined there");
   const Standing standing = co_simulation_->standing();
-  const std::string growth = unbounded_growth(evaluation_.loop(), standing.state);
+  const std::string growth = unbounded_growth(evaluation_.loop(), standing.state, evaluation_.acting_inputs());
   throw Error(told + " at t = " + number_text(standing.time, 15) +
               " s: " + (growth.empty() ? "it is not defined, or too large, for the values reached" : growth));
 }
