@@ -34,17 +34,18 @@ EquilibriumVerdict judge_equilibrium(const Parameters& parameters,
   const Cost& cost = *parameters.cost;
   EquilibriumVerdict verdict;
   verdict.x_star = nash_equilibrium(cost, shape, parameters.guess);
-  verdict.is_affine = cost.is_affine();
   verdict.monotonicity = strong_monotonicity(cost, verdict.x_star);
   const HessianBounds bounds(parameters, cost_expressions);
   bool is_nash = true;
   bool is_local = true;
+  verdict.is_affine = true;
   for (int i = 0; i < shape.players; ++i) {
     const auto [smallest, scale] = own_curvature(cost, shape, i, verdict.x_star);
     const bool is_quadratic = cost_expressions[at(i)].graph == nullptr;
     const Real distance = is_quadratic ? everywhere : proved_distance(bounds, i, verdict.x_star, shape);
     const Switch* kink = is_quadratic ? nullptr : bounds.kink_at(i, verdict.x_star);
     verdict.players.push_back({smallest, distance, kink == nullptr ? "" : kink->text});
+    verdict.is_affine = verdict.is_affine && bounds.has_affine_gradient(i);
     is_nash = is_nash && distance == everywhere;
     is_local = is_local && (distance > 0.0 || (kink == nullptr && smallest > rounding * scale));
   }

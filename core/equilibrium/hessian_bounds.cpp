@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <deque>
+#include <limits>
 
 #include "equilibrium/interval_matrix.hpp"
 
@@ -73,6 +74,16 @@ const Switch* HessianBounds::kink_at(int i, const std::vector<Real>& x) const {
   }
   std::vector<Interval> values;
   return rows(i, box, values).kink;
+}
+
+bool HessianBounds::has_affine_gradient(int i) const {
+  if (players_[at(i)] == nullptr) return true;
+  const OfPlayer& player = *players_[at(i)];
+  if (!player.all.actions.empty() || !player.graph.switches().empty()) return false;
+  constexpr Real infinite = std::numeric_limits<Real>::infinity();
+  std::vector<Interval> values;
+  const std::vector<Interval> everywhere(at(parameters_.shape.actions()), {-infinite, infinite});
+  return rows(i, everywhere, values).definition == Enclosure::Definition::everywhere;
 }
 
 Enclosure::Found HessianBounds::rows(int i, const std::vector<Interval>& box, std::vector<Interval>& values) const {

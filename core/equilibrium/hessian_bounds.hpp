@@ -26,6 +26,9 @@ class HessianBounds {
   /// The same along player i's own actions alone; what else is in the rows is not told.
   Enclosure::Found own_rows(int i, const std::vector<Interval>& box, std::vector<Interval>& values) const;
 
+  /// Whether f_i is defined everywhere, without conditions, and its second derivatives are the same everywhere.
+  [[nodiscard]] bool has_affine_gradient(int i) const;
+
   /// The actions that rows(), or own_rows(), depend on.
   [[nodiscard]] std::vector<int> actions_of_rows(int i) const;
   [[nodiscard]] std::vector<int> actions_of_own_rows(int i) const;

@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "equilibrium/hessian_bounds.hpp"
 #include "errors.hpp"
@@ -126,6 +127,24 @@ TEST(Verdict, CountsEquilibria) {
   }
   EXPECT_GT(verdict.monotonicity, 0.0);
   EXPECT_FALSE(verdict.is_affine);
+}
+
+TEST(Verdict, KnowsGradientsThatAreAffine) {
+  for (const auto& [cost, is_affine] : {
+           std::pair{"x[i]^2 + (3 - i) * x[1] * x[2] - 2 * x[i]", true},
+           std::pair{"(x[i] - 2 * x[mod(i, N) + 1])^2 / 3 + sum(x[j] for j in 1..N)^2", true},
+           std::pair{"x[i]^2 + x[mod(i, N) + 1]^4", true},  // of what others do, the own gradient does not depend on
+           std::pair{"x[i]^2 + 0.1 * x[i]^3", false},
+           std::pair{"x[i]^2 + 0.1 * x[i] * x[mod(i, N) + 1]^2", false},
+           std::pair{"(x[i] - 3)^2 + 0.1 * abs(x[i])", false},
+           std::pair{"x[i]^2 + log(x[mod(i, N) + 1] + 9)", false},  // not defined everywhere
+       }) {
+    const EquilibriumVerdict verdict = verdict_of(game(cost));
+    EXPECT_EQ(verdict.is_affine, is_affine) << cost;
+    if (is_affine) {
+      EXPECT_TRUE(verdict.others.empty()) << cost;
+    }
+  }
 }
 
 TEST(Verdict, TakesTheMonotonicityAtTheEquilibrium) {

@@ -277,6 +277,50 @@ def test_the_rate_seen_is_near_the_spectrum_of_the_same_game_in_coefficients(tmp
     assert seen == pytest.approx(-eigenvalues.real.max(), rel=0.1)
 
 
+SKEW = """
+[parameters]
+A = { value = [[2.0, 1.5, -1.0], [-1.2, 2.5, 0.8], [0.9, -0.7, 3.0]], fixed = true }
+[defaults]
+order = 2
+x0 = [1.0, -1.0]
+cost = { expression = '''
+  sum(0.5 * A[i,i] * x[i,k]^2 + x[i,k] * (sum(A[i,j] * x[j,k] for j in 1..N if j != i) + 1) for k in 1..D)
+  + 0.3 * x[i,1] * x[mod(i, N) + 1,2]''' }
+[[player]]
+name = "a"
+[[player]]
+name = "b"
+order = 1
+[[player]]
+name = "c"
+"""
+
+
+def test_a_game_of_affine_gradients_is_judged_as_one_of_coefficients(tmp_path: Path) -> None:
+    """Couplings that coefficients cannot express, between coordinates: the loop is linear all the same."""
+    path = tmp_path / "skew.toml"
+    path.write_text(HEAD.replace("dimension = 1", "dimension = 2") + SKEW, encoding="utf-8")
+    A = np.array([[2.0, 1.5, -1.0], [-1.2, 2.5, 0.8], [0.9, -0.7, 3.0]])
+    across = np.zeros((6, 6))
+    across[[0, 2, 4], [3, 5, 1]] = 0.3
+    h = np.kron(A, np.eye(2)) + across
+    x_star = np.asarray(np.linalg.solve(h, -np.ones(6)).reshape(3, 2), dtype=np.float64)
+    found = validate(path, limit=20.0)
+    verdicts = {claim.name: claim for claim in found.claims}
+    assert verdicts["nash_equilibrium"].statement == "There is a unique Nash equilibrium x*"
+    assert verdicts["nash_equilibrium"].figures["m"] == pytest.approx(np.linalg.eigvalsh(0.5 * (h + h.T))[0])
+    for name in ("theorem_2_stability", "theorem_2_convergence"):
+        assert verdicts[name].verdict is Verdict.HOLDS
+    game = replace(game_parameters(found.model), x_star=x_star, jacobian=h)
+    expected = spectral_abscissa(linear_loop(game))
+    assert verdicts["theorem_2_stability"].figures["abscissa"] == pytest.approx(expected, rel=1e-7)
+    analysis = analyse(path)
+    assert analysis.verdicts[0] == (
+        "Expressions in costs: what follows is of the unperturbed loop, which is linear."
+    )
+    assert not any("near x*" in verdict for verdict in analysis.verdicts)
+
+
 STARTS = """
 [defaults]
 order = 2

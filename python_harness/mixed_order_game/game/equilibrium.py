@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from ..errors import GameError
 from ..files.reading import expect_file
 from ..fmu.build import GameSource, source_of
+from .definition import Expressions, has_expressions
 from .host_tool import ask, file_of
 
 FloatArray = NDArray[np.float64]
@@ -45,7 +46,8 @@ class Equilibrium:
     kinks: tuple[str, ...]
     """(N,): the text of a condition of f_i that switches at x*; empty without one"""
     monotonicity: float  # m, of the pseudo-gradient's Jacobian at x*
-    is_affine: bool  # all costs are quadratic: m holds everywhere, and x* is the only equilibrium
+    is_affine: bool
+    """All own gradients are affine, so that m holds everywhere and they vanish together at x* alone"""
     others: tuple[FloatArray, ...]  # equilibria in the same sense, (N, D) each
     undefined_at_start: tuple[int, ...]
     """Players, from 1 on, whose gradient is not finite at their first estimates"""
@@ -53,6 +55,11 @@ class Equilibrium:
     @property
     def sentence(self) -> str:
         """What x* is, and how that is known."""
+        if self.kind is Kind.NASH and self.is_affine:
+            return (
+                "x* is the only Nash equilibrium: all gradients are affine, and every cost is convex in its "
+                "player's own action."
+            )
         if self.kind is Kind.NASH:
             return "x* is a Nash equilibrium: every cost is convex in its player's own action."
         if self.kind is Kind.LOCAL:
@@ -127,6 +134,17 @@ def judge_equilibrium(game: GameSource) -> Equilibrium | None:
     with file_of(source) as file:
         told = ask("--judge", file)
     return None if told is None else _equilibrium(told)
+
+
+def has_affine_gradients(game: GameSource, expressions: Expressions) -> bool:
+    """Whether the own gradients of a game with such expressions are affine: its unperturbed loop is linear.
+
+    Raises as judge_equilibrium does.
+    """
+    if not has_expressions(expressions, "cost"):
+        return True
+    found = judge_equilibrium(game)
+    return found is not None and found.is_affine
 
 
 def _equilibrium(told: Mapping[str, Any]) -> Equilibrium:

@@ -11,6 +11,7 @@ from ..errors import GameError, ModelError, ResultError, SimulationError
 from ..fmu.model import Model, Value
 from ..fmu.run import Simulator
 from ..game.definition import has_expressions
+from ..game.equilibrium import has_affine_gradients
 from ..game.parameters import GameParameters, game_parameters
 from ..results.result import Result
 from ..results.time_figures import MOST_ESTIMATING
@@ -69,6 +70,8 @@ def _predicted_rate(
             abscissa = linearized_loop(simulator, changes).abscissa
         except SimulationError as error:
             return None, [f"No rate is predicted: {cost}, and {error}."]
+        if has_affine_gradients(simulator.model.path, game.expressions):
+            return abscissa, []
         return abscissa, [
             f"The predicted rate is that of the loop linearized at x*, for near x* alone: {cost}."
         ]

@@ -25,13 +25,14 @@ from ..theory.linearized import linearized_loop
 from .claims.archive import archive_valid
 from .claims.control_bounds import control_bounds
 from .claims.early_end import Ended, run_or_end
-from .claims.equilibrium import nash_equilibrium_exists
+from .claims.equilibrium import equilibrium_claim, equilibrium_of_expressions
 from .claims.explanation import explain
 from .claims.neighbourhood import within_neighbourhood
 from .claims.perturbed_run import PerturbedRun
 from .claims.practical_convergence import Observed, nothing_to_observe, observe, practical_convergence
 from .claims.tolerances import TOLERANCE
 from .claims.unperturbed_loop import (
+    LARGEST_LINEAR_LOOP,
     run_until_decay_is_seen,
     spectrum_of,
     unperturbed_actions_converge,
@@ -194,9 +195,12 @@ def _judged(
 ) -> Validation:
     model = simulator.model
     game = game_parameters(model)
+    known = equilibrium_of_expressions(game, model.path)
     if has_expressions(game.expressions, "cost"):
         game = replace(game, x_star=_equilibrium_of(simulator))
-    equilibrium = nash_equilibrium_exists(game, model.path)
+    if known is not None and known.is_affine:
+        game = _linear(simulator, game)
+    equilibrium = equilibrium_claim(game, known)
     if equilibrium.verdict is Verdict.FAILS:
         claims = [
             equilibrium,
@@ -206,7 +210,7 @@ def _judged(
         return Validation(model, tuple(claims), (), None, None)
     spectrum = spectrum_of(game)
     plain: Result | Ended
-    if has_expressions(game.expressions, "cost"):
+    if has_expressions(game.expressions, "cost") and game.jacobian is None:
         plain, spectrum = run_until_decay_is_seen(simulator, game, spectrum, limit, progress)
     else:
         plain = unperturbed_run(simulator, game, spectrum, progress=progress)
@@ -241,12 +245,21 @@ def _judged(
     )
 
 
+def _linear(simulator: Simulator, game: GameParameters) -> GameParameters:
+    """With the Jacobian of a pseudo-gradient that is affine; as it is where the loop is too large for it."""
+    try:
+        loop = linearized_loop(simulator)
+    except SimulationError:
+        return game
+    return loop.game if game.players <= LARGEST_LINEAR_LOOP and not loop.is_large else game
+
+
 def _locally(simulator: Simulator, game: GameParameters) -> float | Stability | None:
-    """Of the loop linearized at x*, where a cost has an expression: its spectral abscissa in 1/s.
+    """Of the loop linearized at x*, where it may not be linear: its spectral abscissa in 1/s.
 
     Of a large one it is whether it is stable.
     """
-    if not has_expressions(game.expressions, "cost"):
+    if game.jacobian is not None or not has_expressions(game.expressions, "cost"):
         return None
     try:
         loop = linearized_loop(simulator)
@@ -324,7 +337,7 @@ def _notes(game: GameParameters) -> list[str]:
     """What settling rests on where the game file does not tell it."""
     notes = []
     cost, disturbance = (has_expressions(game.expressions, part) for part in ("cost", "disturbance"))
-    if cost:
+    if cost and game.jacobian is None:
         notes.append(f"The slowest rate is that of the unperturbed run: {cost}.")
     if disturbance:
         notes.append(

@@ -8,6 +8,7 @@ import numpy as np
 from ..fmu.model import Value
 from ..fmu.run import Simulator
 from ..game.definition import Expressions, named_parts
+from ..game.equilibrium import has_affine_gradients
 from .box_analysis import box_analysis
 from .findings import Analysis, Progress, Row
 from .growing_modes import Stability, stability
@@ -37,7 +38,8 @@ def local_analysis(
         report("linearizing", 0.0)
         loop = linearized_loop(simulator, changes)
     monotonicity = float(np.linalg.eigvalsh(0.5 * (loop.jacobian + loop.jacobian.T))[0])
-    where = " at x*" if "cost" in model.expressions else ""
+    linear = has_affine_gradients(fmu, model.expressions)
+    where = "" if linear else " at x*"
     kind = "strongly monotone" if monotonicity > 0.0 else "not strongly monotone"
     norm = float(np.linalg.norm(loop.jacobian, 2))
     rows = [
@@ -65,7 +67,7 @@ def local_analysis(
         hypotheses=found.hypotheses,
         demonstrations=found.demonstrations,
         verdicts=(
-            _subject(model.expressions),
+            _subject(model.expressions, linear=linear),
             _stability(judged, where),
             f"The pseudo-gradient is {kind}{where}: m = {monotonicity:.4g}.",
             *found.verdicts,
@@ -77,13 +79,11 @@ def local_analysis(
     )
 
 
-def _subject(expressions: Expressions) -> str:
+def _subject(expressions: Expressions, *, linear: bool) -> str:
     told = named_parts(expressions)
-    if "cost" in expressions:
-        return (
-            f"Expressions in {told}: what follows is of the loop linearized at x*, and holds near x* alone."
-        )
-    return f"Expressions in {told}: what follows is of the unperturbed loop, which is linear."
+    if linear:
+        return f"Expressions in {told}: what follows is of the unperturbed loop, which is linear."
+    return f"Expressions in {told}: what follows is of the loop linearized at x*, and holds near x* alone."
 
 
 def _by_abscissa(abscissa: float) -> Stability:

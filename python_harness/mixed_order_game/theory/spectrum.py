@@ -175,11 +175,11 @@ def predicted_deviation(game: GameParameters, stop: float, intervals: int) -> tu
     step = stop / intervals
     propagator = expm(linear_loop(game) * step)
     state = initial_deviation(game)
+    actions = len(owners(game))
     deviations = np.empty((intervals + 1, game.players, game.dimension))
-    deviations[0] = state[: game.players]
-    for k in range(1, intervals + 1):
+    for k in range(intervals + 1):
+        deviations[k] = state[:actions].reshape(deviations.shape[1:])
         state = propagator @ state
-        deviations[k] = state[: game.players]
     return np.linspace(0.0, stop, intervals + 1), deviations
 
 

@@ -11,6 +11,8 @@ from ...game.parameters import GameParameters
 from ...theory.spectrum import monotonicity_constant, nash_equilibrium
 from .verdict import Claim, Verdict
 
+UNIQUE = "There is a unique Nash equilibrium x*"
+
 FLAT = 1e-12
 """Curvatures of this part of their terms are zero to rounding."""
 
@@ -21,19 +23,30 @@ def nash_equilibrium_exists(game: GameParameters, fmu: Path) -> Claim:
     An FMU whose costs have expressions cannot be instantiated unless it found such a point; what is known of
     it is judged by the game in the FMU.
     """
-    if has_expressions(game.expressions, "cost") and (found := judge_equilibrium(fmu)):
+    return equilibrium_claim(game, equilibrium_of_expressions(game, fmu))
+
+
+def equilibrium_of_expressions(game: GameParameters, fmu: Path) -> Equilibrium | None:
+    """What is known of x* where a cost has an expression; None of other games."""
+    return judge_equilibrium(fmu) if has_expressions(game.expressions, "cost") else None
+
+
+def equilibrium_claim(game: GameParameters, found: Equilibrium | None) -> Claim:
+    """The claim, by what is known of costs with expressions, or by coefficients."""
+    if found is not None:
         return _of_expressions(found)
     verdict, reason = _judge(game)
     figures = {"m": monotonicity_constant(game)}
-    return Claim("nash_equilibrium", "There is a unique Nash equilibrium x*", verdict, reason, figures)
+    return Claim("nash_equilibrium", UNIQUE, verdict, reason, figures)
 
 
 def _of_expressions(found: Equilibrium) -> Claim:
     figures = {"m": found.monotonicity, "convex_within": float(found.convex_within.min())}
     verdict = Verdict.NOT_SETTLED if found.kind is Kind.OPEN else Verdict.HOLDS
     warnings = [each for each in found.warnings if each != found.sentence]
-    told = [found.sentence, *(warnings or ["That it is the only one is not proved."])]
-    statement = "x* is a Nash equilibrium, if only a local one"
+    only = found.kind is Kind.NASH and found.is_affine
+    told = [found.sentence, *(warnings or ([] if only else ["That it is the only one is not proved."]))]
+    statement = UNIQUE if only else "x* is a Nash equilibrium, if only a local one"
     return Claim("nash_equilibrium", statement, verdict, " ".join(told), figures)
 
 

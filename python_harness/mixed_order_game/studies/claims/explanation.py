@@ -29,7 +29,7 @@ def explain(run: PerturbedRun, game: GameParameters) -> str:
     """One sentence with the bound and what it is made of."""
     expression = has_expressions(game.expressions, "cost")
     if expression:
-        return f"No bound explains the neighbourhood: {expression}, and the bound is for quadratic costs."
+        return f"No bound explains the neighbourhood: {expression}, and the bound reads coefficients."
     if at_bound(run.result.u[run.judged], game).any():
         return "No bound explains the neighbourhood: a control is at u_max, where it does not follow e."
     m = monotonicity_constant(game)

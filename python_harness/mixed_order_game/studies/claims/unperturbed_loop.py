@@ -51,7 +51,7 @@ RESOLVED = 1000.0
 
 @dataclass(frozen=True)
 class Spectrum:
-    """Where the slowest mode lies; abscissa is None for a loop that is not linear, or too large."""
+    """Where the slowest mode lies; abscissa is None for a loop that may not be linear, or is too large."""
 
     abscissa: float | None  # 1/s
     marginal: bool  # zero to rounding
@@ -66,9 +66,10 @@ class Spectrum:
 def spectrum_of(game: GameParameters) -> Spectrum:
     """Eigenvalues of the linear loop; for large games rates of its parts in place of the slowest mode.
 
-    No rate is known beforehand where a cost has an expression: see slowest_rate_seen.
+    No rate is known beforehand where a cost has an expression, unless the game holds the Jacobian that is the
+    same everywhere: see slowest_rate_seen.
     """
-    if has_expressions(game.expressions, "cost"):
+    if has_expressions(game.expressions, "cost") and game.jacobian is None:
         return Spectrum(None, marginal=False, slowest_rate=0.0)
     if game.players > LARGEST_LINEAR_LOOP:
         pull = float(np.min(game.k2)) * monotonicity_constant(game)
@@ -88,7 +89,7 @@ def unperturbed_loop_stable(
     Where a cost has an expression, local is the spectral abscissa in 1/s of the loop linearized at x*, or
     whether that is stable: an unstable one refutes the claim, a stable one does not prove it.
     """
-    expression = has_expressions(game.expressions, "cost")
+    expression = has_expressions(game.expressions, "cost") if game.jacobian is None else None
     abscissa = spectrum.abscissa
     if expression:
         abscissa = local if isinstance(local, float) else None
@@ -112,17 +113,16 @@ def unperturbed_loop_stable(
 
 
 def _judged_near(local: float | Stability | None, expression: str) -> tuple[Verdict, str]:
-    """Of a loop that is not linear, because of an expression."""
+    """Of a loop that may not be linear, because of an expression."""
+    told = f"The loop need not be linear, {expression}"
     if local is None:
-        return Verdict.NOT_COVERED, f"The loop is not linear, {expression}: it has no eigenvalues to judge."
+        return Verdict.NOT_COVERED, f"{told}: it has no eigenvalues to judge."
     if isinstance(local, Stability):
-        told = f"The loop is not linear, {expression}; linearized at x*, {local.told}"
+        told += f"; linearized at x*, {local.told}"
         if local.stable is False:
             return Verdict.FAILS, f"{told}: they grow there."
         return Verdict.NOT_COVERED, f"{told}{': it is exponentially stable near x*' if local.stable else ''}."
-    told = (
-        f"The loop is not linear, {expression}; linearized at x* its spectral abscissa is {local:.4g} 1/s: "
-    )
+    told += f"; linearized at x* its spectral abscissa is {local:.4g} 1/s: "
     if local > 0.0:
         return Verdict.FAILS, told + "a mode grows there."
     return Verdict.NOT_COVERED, told + (
