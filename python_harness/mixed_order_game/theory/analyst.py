@@ -35,7 +35,7 @@ from .exact_loop import (
 )
 from .findings import Analysis, Demonstration, Figure, Progress, Row
 from .game import AnalysedGame, Gains, moving
-from .growing_modes import stability
+from .growing_modes import AT_LEAST, stability
 from .hypotheses import (
     BOUNDED,
     Hypothesis,
@@ -178,6 +178,8 @@ class Analyst:
             if judged.stable is not None:
                 meaning = "unperturbed loop exponentially stable"
                 self._row("exact", "stable", judged.stable, "1", meaning)
+            if judged.rate > 0.0:
+                self._row("exact", "slowest rate", judged.rate, "1/s", AT_LEAST)
             begin = {
                 True: "these gains converge exponentially",
                 False: "these gains do not converge",

@@ -16,8 +16,13 @@ entry of (iw + K3 M_j)^-1 exceeds that of (K3 M_j)^-1 in size: |C_ij(iw)| <= C_i
 E(w) = T(iw) T(iv)^-1 - I stays below 1 on the way. Elimination does not raise that norm and needs no
 pivoting, so the pivots of I + E stay in the right half-plane, and their arguments add up to that of the
 determinant.
+
+All of this holds as well along s = -r + iw, with C_ij(-r) in place of 1 and K3 M_j - r I in place of K3 M_j,
+as long as r is below the least eigenvalue of every K3 M_j. So bisection finds a rate r that no mode is slower
+than.
 """
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from time import monotonic
@@ -29,20 +34,26 @@ from scipy.linalg import lu_factor
 from ..errors import SimulationError
 from ..game.parameters import GameParameters
 from .graph import consensus_blocks, is_connected
-from .spectrum import gradient_map, owners
+from .spectrum import consensus_rate, gradient_map, owners
 
 FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
-Answers = Callable[[float], ComplexArray]
+Answers = Callable[[complex], ComplexArray]
 
 LARGEST = 250
 """Most players: inverses and modes of all M_j are N^3 numbers each, 125 MB; 200 take some 2 s of one core."""
+
+WIDTH = 1.01
+"""Ratio of the rates at which bisection of the slowest one ends."""
 
 CHANGE = 0.9
 """Bound of the 1-norm of E over a step."""
 
 SHORTEST = 1e-12
 """A step of this part of the whole way is too short to tell a zero from one on the imaginary axis."""
+
+AT_LEAST = "a lower bound, by counting eigenvalues: no mode is slower"
+"""What the rate of a large loop is."""
 
 
 @dataclass(frozen=True)
@@ -51,20 +62,26 @@ class Stability:
 
     stable: bool | None  # None: not decided
     told: str
+    rate: float = 0.0  # 1/s, no mode decays more slowly; 0 where none is known
 
 
-def stability(game: GameParameters, *, time_limit: float = 60.0) -> Stability:
+def stability(game: GameParameters, *, rate: bool = True, time_limit: float = 60.0) -> Stability:
     """Of a loop by counting its eigenvalues with positive real parts, where that is possible.
 
-    time_limit in s of computing.
+    rate: whether a rate is sought, too, which takes some ten times as long. time_limit in s of computing.
     """
     states = len(owners(game)) * (2 + game.players)
+    deadline = monotonic() + time_limit
     try:
-        count = growing_modes(game, time_limit=time_limit)
+        loop = _ReducedLoop(game)
+        count = loop.beyond(0.0, deadline)
     except SimulationError as error:
         return Stability(None, f"the loop has {states:,} states, too many for its eigenvalues, and {error}")
     if not count:
-        return Stability(stable=True, told=f"all {states:,} eigenvalues have negative real parts")
+        least = _slowest_rate(loop, deadline) if rate else 0.0
+        parts = f"real parts of at most {-least:g} 1/s" if least > 0.0 else "negative real parts"
+        told = f"all {states:,} eigenvalues have {parts}"
+        return Stability(stable=True, told=told, rate=least)
     have = "has a positive real part" if count == 1 else "have positive real parts"
     return Stability(stable=False, told=f"{count:,} of the {states:,} eigenvalues {have}")
 
@@ -75,38 +92,26 @@ def growing_modes(game: GameParameters, *, time_limit: float = 60.0) -> int:
     Raises SimulationError for more than LARGEST players, a graph that is not connected, an eigenvalue that is
     0 or imaginary to rounding, and when computing takes longer than time_limit, in s.
     """
-    if game.players > LARGEST:
-        raise SimulationError(f"the game has {game.players} players, more than {LARGEST}")
-    if not is_connected(game.adjacency):
-        raise SimulationError("the graph is not connected: some estimates are corrected by nothing")
-    begin = monotonic()
-    loop = _ReducedLoop(game)
-    end = loop.end()
-    v, turned, step = 0.0, 0.0, end
-    matrix, change = loop.at(v)
-    while v < end:
-        try:
-            inverse = np.linalg.inv(matrix)
-        except np.linalg.LinAlgError:
-            raise _on_the_axis(v) from None
-        size = np.abs(inverse)
-        while not (change(min(v + step, end)) @ size).max() <= CHANGE:
-            step *= 0.7
-            if step < SHORTEST * end:
-                raise _on_the_axis(v)
-        v, step = min(v + step, end), 1.5 * step
-        matrix, change = loop.at(v)
-        turned += _argument(matrix @ inverse)
-        if monotonic() - begin > time_limit:
-            raise SimulationError(f"{time_limit:g} s of computing came to {v:.3g} of {end:.3g} 1/s")
-    rest = loop.own(end)
-    missing = float(np.angle(rest).sum()) + _argument(matrix / rest) - turned
-    return round(missing / np.pi)
+    deadline = monotonic() + time_limit
+    return _ReducedLoop(game).beyond(0.0, deadline)
 
 
-def _on_the_axis(w: float) -> SimulationError:
-    at = "0" if w == 0.0 else f"{w:.4g} i 1/s"
-    return SimulationError(f"an eigenvalue is {at} to rounding")
+def _slowest_rate(loop: "_ReducedLoop", deadline: float) -> float:
+    """A rate in 1/s, of three digits, that no mode of a stable loop is slower than; 0 if there is no time.
+
+    The slowest mode's is at most 2 % larger, unless it is beyond the loop's limit or time was over.
+    """
+    low, high = 0.0, loop.limit
+    try:
+        while high > WIDTH * low:
+            middle = math.sqrt(low * high) if low else 0.5 * high
+            if loop.beyond(middle, deadline):
+                high = middle
+            else:
+                low = middle
+    except SimulationError:  # out of time, or an eigenvalue on the line
+        pass
+    return float(f"{0.995 * low:.3g}")  # rounded down
 
 
 def _argument(matrix: ComplexArray) -> float:
@@ -116,55 +121,96 @@ def _argument(matrix: ComplexArray) -> float:
 
 
 class _ReducedLoop:
-    """T along the imaginary axis, w in 1/s; an action for each coordinate unless coordinates are alike."""
+    """T along s = -rate + iw, in 1/s; an action for each coordinate unless coordinates are alike."""
 
     def __init__(self, game: GameParameters) -> None:
+        if game.players > LARGEST:
+            raise SimulationError(f"the game has {game.players} players, more than {LARGEST}")
+        if not is_connected(game.adjacency):
+            raise SimulationError("the graph is not connected: some estimates are corrected by nothing")
         of = owners(game)
         self._pairs = np.ix_(of, of)
         self._h = gradient_map(game) if game.jacobian is None else game.jacobian
         self._first = game.first_order[of]
         self._k2, self._k = game.of_players("k2")[of], game.regulation[of]
         a, k3, blocks = game.adjacency, game.of_players("k3"), consensus_blocks(game.adjacency)
-        scaled = k3[:, np.newaxis] * blocks  # K3 M_j
-        self._inverses = np.linalg.inv(scaled)
+        self._scaled = k3[:, np.newaxis] * blocks  # K3 M_j
         self._answers = (
-            _by_solving(scaled, k3[:, np.newaxis] * a) if game.directed else _by_modes(blocks, k3, a)
+            _by_solving(self._scaled, k3[:, np.newaxis] * a) if game.directed else _by_modes(blocks, k3, a)
         )
+        self.limit = min(consensus_rate(game), float(self._k[self._first].min(initial=math.inf)))
+        """Rate of the slowest mode that T does not have"""
 
-    def own(self, w: float) -> ComplexArray:
+    def beyond(self, rate: float, deadline: float) -> int:
+        """How many eigenvalues have real parts above -rate, below the limit; none has -rate.
+
+        Raises SimulationError if one has to rounding, and at the deadline.
+        """
+        self._rate = rate
+        self._inverses = np.linalg.inv(self._scaled - rate * np.eye(len(self._scaled)))
+        end = self._end()
+        v, turned, step = 0.0, 0.0, end
+        matrix, change = self._at(v)
+        while v < end:
+            try:
+                inverse = np.linalg.inv(matrix)
+            except np.linalg.LinAlgError:
+                raise self._on_the_line(v) from None
+            size = np.abs(inverse)
+            while not (change(min(v + step, end)) @ size).max() <= CHANGE:
+                step *= 0.7
+                if step < SHORTEST * end:
+                    raise self._on_the_line(v)
+            v, step = min(v + step, end), 1.5 * step
+            matrix, change = self._at(v)
+            turned += _argument(matrix @ inverse)
+            if monotonic() > deadline:
+                raise SimulationError(f"the time for computing was over at {v:.3g} of {end:.3g} 1/s")
+        s = self._s(end)
+        own = np.angle(s) * len(matrix) + np.angle(s + self._k[~self._first]).sum()
+        return round(float(own + _argument(matrix / self._own(end)) - turned) / math.pi)
+
+    def _s(self, w: float) -> complex:
+        return complex(-self._rate, w)
+
+    def _own(self, w: float) -> ComplexArray:
         """q (n,), which grows with w."""
-        s = 1j * w
+        s = self._s(w)
         second = s * (s + self._k) / (self._k2 * self._k)
         return np.asarray(np.where(self._first, s / self._k2, second), dtype=np.complex128)
 
-    def at(self, v: float) -> tuple[ComplexArray, Callable[[float], FloatArray]]:
+    def _at(self, v: float) -> tuple[ComplexArray, Callable[[float], FloatArray]]:
         """T (n, n) at v, and by how much its columns' entries differ at most in sum from there to w, (n,)."""
-        answers, own = self._answers(v), self.own(v)
+        answers, own = self._answers(self._s(v)), self._own(v)
         slopes = (self._inverses @ np.abs(answers)[:, :, np.newaxis])[:, :, 0].T
         sums = (np.abs(self._h) * slopes[self._pairs]).sum(axis=0)
 
         def change(w: float) -> FloatArray:
-            return np.asarray(np.abs(self.own(w) - own) + (w - v) * sums)
+            return np.asarray(np.abs(self._own(w) - own) + (w - v) * sums)
 
         return np.diag(own) + self._h * answers.T[self._pairs], change
 
-    def end(self) -> float:
+    def _end(self) -> float:
         """Where diag(q) outweighs the rest of T so much that nothing happens beyond."""
-        weights, w = np.abs(self._h).sum(axis=0), float(self._k2.min())
-        while (weights > CHANGE * np.abs(self.own(w))).any():
+        largest = self._answers(self._s(0.0)).real.T[self._pairs]
+        weights, w = (np.abs(self._h) * largest).sum(axis=0), float(self._k2.min())
+        while (weights > CHANGE * np.abs(self._own(w))).any():
             w *= 1.1
         return w
 
+    def _on_the_line(self, w: float) -> SimulationError:
+        return SimulationError(f"an eigenvalue is {self._s(w) or 0.0:.4g} to rounding")
+
 
 def _by_modes(blocks: FloatArray, k3: FloatArray, a: FloatArray) -> Answers:
-    """C(iw)', (N, N), row j of the estimates of player j, from the modes of K3^1/2 M_j K3^1/2, symmetric."""
+    """C(s)', (N, N), row j of the estimates of player j, from the modes of K3^1/2 M_j K3^1/2, symmetric."""
     root = np.sqrt(k3)
     rates, modes = np.linalg.eigh(root[:, np.newaxis] * blocks * root)
     modes *= root[:, np.newaxis]
     shares = modes * np.einsum("jik,ij->jk", modes, a)[:, np.newaxis, :]
 
-    def answers(w: float) -> ComplexArray:
-        return np.asarray((shares @ (1.0 / (1j * w + rates))[:, :, np.newaxis])[:, :, 0])
+    def answers(s: complex) -> ComplexArray:
+        return np.asarray((shares @ (1.0 / (s + rates))[:, :, np.newaxis])[:, :, 0])
 
     return answers
 
@@ -173,7 +219,7 @@ def _by_solving(scaled: FloatArray, pull: FloatArray) -> Answers:
     """The same of a directed graph, whose modes may be far from orthogonal."""
     unit = np.eye(len(pull))
 
-    def answers(w: float) -> ComplexArray:
-        return np.asarray(np.linalg.solve(1j * w * unit + scaled, pull.T[:, :, np.newaxis])[:, :, 0])
+    def answers(s: complex) -> ComplexArray:
+        return np.asarray(np.linalg.solve(s * unit + scaled, pull.T[:, :, np.newaxis])[:, :, 0])
 
     return answers

@@ -11,7 +11,7 @@ from ..game.definition import Expressions, named_parts
 from ..game.equilibrium import has_affine_gradients
 from .box_analysis import box_analysis
 from .findings import Analysis, Progress, Row
-from .growing_modes import Stability, stability
+from .growing_modes import AT_LEAST, Stability, stability
 from .linearized import linearized_loop
 
 
@@ -50,6 +50,8 @@ def local_analysis(
     report("eigenvalues", 0.0)
     if loop.is_large:
         judged = stability(loop.game)
+        if judged.rate > 0.0:
+            rows.append(Row("local", "slowest rate", judged.rate, "1/s", AT_LEAST))
     else:
         abscissa = loop.abscissa
         judged = _by_abscissa(abscissa)
