@@ -334,10 +334,20 @@ def overhead(context: Context) -> Result:
 
 def sweep(context: Context) -> Result:
     """A run of a sweep against one fmi2DoStep over the horizon, and two processes against one."""
+    return _of_package("sweep_cost", "--graphs", 100 if context.quick else 728, "--rounds", 3)
+
+
+def coupled(context: Context) -> Result:
+    """One FMU a player, coupled every 20 ms, against the whole game."""
+    return _of_package("coupled_cost", "--rounds", 3 if context.quick else 11)
+
+
+def _of_package(module: str, *options: object) -> Result:
+    """What a module that needs the package prints, run in the project's own environment."""
     own = ROOT / ".venv" / "bin" / "python"
     if not own.exists():
         raise FileNotFoundError(f"{own} is missing: ./dev build makes it")
-    words = [own, "-m", "tests.bench.sweep_cost", "--graphs", 100 if context.quick else 728, "--rounds", 3]
+    words = [own, "-m", f"tests.bench.{module}", *options]
     done = subprocess.run([str(word) for word in words], check=True, capture_output=True, text=True, cwd=ROOT)
     return dict(json.loads(done.stdout))
 
@@ -506,6 +516,7 @@ PARTS: dict[str, Callable[[Context], Result]] = {
     "overhead": overhead,
     "sweep": sweep,
     "changes": changes,
+    "coupled": coupled,
     "microbench": microbench,
 }
 

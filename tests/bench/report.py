@@ -43,6 +43,7 @@ def markdown(results: Results) -> str:
         "overhead",
         "sweep",
         "changes",
+        "coupled",
         "microbench",
     )
     for part in parts:
@@ -326,6 +327,42 @@ def _changes(result: Results) -> list[str]:
         " of pairs; what follows a change are steps of a Rosenbrock method instead of a start of CVODE.",
         "",
         *_table(["changed", "idle, us", "changed, us", "difference", "ratio", "target, us"], rows),
+    ]
+
+
+def _coupled(result: Results) -> list[str]:
+    rows = []
+    for row in result["rows"]:
+        for library, name in (("own", "each its own"), ("one", "one for all")):
+            spent = [
+                f"{1e6 * row[key]:.3g}"
+                for key in ("whole", f"{library}_idle", f"{library}_coupled", f"{library}_exchange")
+            ]
+            idle, coupled = (row[f"{library}_{key}_ratio"] for key in ("idle", "coupled"))
+            ratios = [f"{idle:.1f}", f"**{coupled:.1f}** ({_verdict(coupled, 3.0, at_least=False)})"]
+            rows.append([str(row["players"]), name, *spent[:2], ratios[0], spent[2], ratios[1], spent[3]])
+    counts = "; ".join(
+        f"with N = {row['players']}, {row['evaluations']['whole'][0]:.1f} of the whole game, "
+        + " and ".join(
+            f"{row['evaluations'][f'order {order}'][0]:.0f} to {row['evaluations'][f'order {order}'][1]:.0f}"
+            f" of a player of order {order}"
+            for order in (1, 2)
+        )
+        for row in result["rows"]
+    )
+    return [
+        "## What players apart cost",
+        "",
+        f"One FMU a player, coupled every {1e3 * result['step']:g} ms, beside the whole game, the paper's"
+        " over 20 s and the scaling family's of 20 players over 10 s; in one process, called from Python. CPU"
+        " microseconds of a communication step, all FMUs together: of fmi2DoStep, and in the last column of"
+        " the calls that get and set what is exchanged; ratios to the whole game, medians of runs that took"
+        " turns. Idle FMUs are told the same every time. Tools unpack each FMU and load the shared library"
+        " that it brings; where all load one file, as `mog periods` does, the caches hold its code once.",
+        "",
+        *_table(["N", "library", "whole", "idle", "ratio", "coupled", "ratio", "get and set"], rows),
+        f"Right-hand sides in a step: {counts}.",
+        "",
     ]
 
 
