@@ -9,10 +9,12 @@ import pytest
 
 from mixed_order_game import ResultError, Simulator, read_model, run
 from mixed_order_game.results.metrics import (
+    Metrics,
     control_energy,
     overshoot,
     sampled_metrics,
     settling_time,
+    told_figure,
 )
 from mixed_order_game.studies.sampler import Sampler, Settings
 
@@ -27,6 +29,13 @@ def test_settling_time_of_an_exponential() -> None:
     late = settling_time(time, error, 0.06)
     assert time[15] - 1.0 < late < time[16] - 1.0
     assert settling_time(np.array([0.0, 1.0]), np.array([1.0, 0.0]), 0.1) == 1.0
+
+
+def test_what_did_not_settle_is_told_in_words() -> None:
+    never = Metrics(np.nan, 0.1, np.nan, 1.0, 0.5, 3.0, 0.02)
+    told = [told_figure(never, name, 3) for name in ("settling_time", "control_energy", "final_error")]
+    assert told == ["not settled", "-", "0.5"]
+    assert told_figure(None, "settling_time", 3) == "-"
 
 
 def test_overshoot() -> None:

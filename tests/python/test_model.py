@@ -62,6 +62,13 @@ def test_names_without_indices_set_all_of_their_kind(fmu: Path) -> None:
         model.start_values({"x1": 0.0})
 
 
+def test_a_fixed_parameter_is_said_to_be_no_variable() -> None:
+    model = read_model("cournot_isoelastic")
+    for name in ("scale", "scale[1]"):
+        with pytest.raises(VariableError, match="scale is fixed, a part of the game's expressions"):
+            model.start_values({name: 1.0})
+
+
 @pytest.mark.parametrize("text", ["k5", "nash", "W_norm", "x_stra", "dynamics_gian"])
 def test_no_name_is_proposed_twice(text: str, fmu: Path) -> None:
     for look_up in (read_model(fmu).variable, lambda name: read_model(fmu).select([name])):

@@ -122,7 +122,7 @@ def _print(found: "Comparison") -> None:
     from rich.table import Table
     from rich.text import Text
 
-    from ..results.metrics import METRIC_UNITS
+    from ..results.metrics import METRIC_UNITS, told_figure
     from .printing import show, standard_output
 
     console = standard_output()
@@ -130,8 +130,7 @@ def _print(found: "Comparison") -> None:
     for name, unit in METRIC_UNITS.items():
         table.add_column(name.replace("_", " ") + (f" ({unit})" if unit else ""))
     for run in found.runs:
-        figures = [None if run.metrics is None else getattr(run.metrics, name) for name in METRIC_UNITS]
-        table.add_row(Text(run.label), *("-" if value is None else f"{value:.3g}" for value in figures))
+        table.add_row(Text(run.label), *(told_figure(run.metrics, name, 3) for name in METRIC_UNITS))
     show(table, console)
     for run in found.runs:
         if run.error:

@@ -124,7 +124,7 @@ def _print(found: "Tuned") -> None:
     from rich.table import Table
     from rich.text import Text
 
-    from ..results.metrics import METRIC_UNITS
+    from ..results.metrics import METRIC_UNITS, told_figure
     from .printing import show, standard_output
 
     console = standard_output()
@@ -133,7 +133,7 @@ def _print(found: "Tuned") -> None:
         table.add_row(name, f"{found.start_gains[name]:.4g}", f"{value:.4g}")
     before, after = found.start_metrics[found.worst], found.metrics[found.worst]
     for name, unit in METRIC_UNITS.items():
-        cells = ("-" if each is None else f"{getattr(each, name):.4g}" for each in (before, after))
+        cells = (told_figure(each, name, 4) for each in (before, after))
         table.add_row(name.replace("_", " ") + (f" ({unit})" if unit else ""), *cells)
     show(table, console)
     count = len(found.graphs)

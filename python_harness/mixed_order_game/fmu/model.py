@@ -17,7 +17,7 @@ import numpy as np
 
 from ..errors import ModelError, UnknownVariableError, VariableError, reason
 from ..files.reading import expect_file, read_text, text_of, toml_of
-from ..game.definition import expressions_of, with_defaults
+from ..game.definition import expressions_of, named_parameters, with_defaults
 from ..names import parse_name
 from .build import GameSource, default_game, fmu_of
 
@@ -225,8 +225,10 @@ class Model:
         named = (f"der({variable.name})" for variable in self.indexed(stem).values())
         return [rate for rate in named if rate in self.variables]
 
-    @staticmethod
-    def _unknown(name: str, known: Iterable[str]) -> UnknownVariableError:
+    def _unknown(self, name: str, known: Iterable[str]) -> UnknownVariableError:
+        stem = parse_name(name)[0]
+        if any(each.fixed and each.name == stem for each in named_parameters(self.game)):
+            return UnknownVariableError(f"{stem} is fixed, a part of the game's expressions and no variable")
         near = difflib.get_close_matches(name, dict.fromkeys(known), n=3, cutoff=0.5)
         hint = f"; did you mean {' or '.join(near)}?" if near else ""
         return UnknownVariableError(f"there is no variable {name}{hint}")

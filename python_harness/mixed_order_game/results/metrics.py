@@ -132,3 +132,11 @@ def control_energy(time: FloatArray, u: FloatArray) -> float:
     """Integral of |u|^2 over time (T,), by the trapezoidal rule; u (T, N, D)."""
     power = (u * u).sum(axis=(1, 2))
     return float(0.5 * np.sum((power[1:] + power[:-1]) * np.diff(time)))
+
+
+def told_figure(metrics: Metrics | None, name: str, digits: int) -> str:
+    """A figure in so many digits for a table: a dash for what is not known, words for a run that goes on."""
+    value = float("nan") if metrics is None else float(getattr(metrics, name))
+    if not np.isnan(value):
+        return f"{value:.{digits}g}"
+    return "-" if metrics is None or name != "settling_time" else "not settled"

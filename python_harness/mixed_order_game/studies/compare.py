@@ -15,8 +15,8 @@ from ..files.writing import RESULT
 from ..fmu.build import SOURCE_OR_RESULT, GameSource, fmu_of
 from ..fmu.model import Model, Value, read_model
 from ..interrupts import noted_signals
-from ..notebook import digits, page, paragraph, table
-from ..results.metrics import METRIC_UNITS, Metrics
+from ..notebook import page, paragraph, table
+from ..results.metrics import METRIC_UNITS, Metrics, told_figure
 from ..results.result import Result, load
 from .sampler import Sampler, Settings
 
@@ -82,8 +82,7 @@ class Comparison:
             *(name.replace("_", " ") + (f" ({unit})" if unit else "") for name, unit in METRIC_UNITS.items()),
         ]
         rows = [
-            (run.label, *(digits(float(getattr(run.metrics, name, float("nan")))) for name in METRIC_UNITS))
-            for run in self.runs
+            (run.label, *(told_figure(run.metrics, name, 4) for name in METRIC_UNITS)) for run in self.runs
         ]
         errors = [paragraph(f"{run.label}: {run.error}") for run in self.runs if run.error]
         return page("Runs side by side", table(header, rows), *errors)

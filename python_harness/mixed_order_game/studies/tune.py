@@ -24,7 +24,7 @@ from ..game.graphs import CommunicationGraph, graph_of
 from ..game.parameters import GAINS_OF_ORDER, GameParameters, game_parameters
 from ..interrupts import noted_signals
 from ..notebook import digits, page, paragraph, table
-from ..results.metrics import METRIC_UNITS, SETTLED, Metrics
+from ..results.metrics import METRIC_UNITS, SETTLED, Metrics, told_figure
 from ..theory.linearized import LARGEST as LARGEST_LINEAR
 from ..theory.linearized import linearized_loop
 from ..theory.spectrum import initial_deviation, linear_loop, owners, spectral_abscissa
@@ -197,7 +197,7 @@ class Tuned:
             (name, digits(self.start_gains[name]), digits(value)) for name, value in self.gains.items()
         ]
         for name, unit in METRIC_UNITS.items():
-            cells = (digits(float(getattr(each, name, np.nan))) for each in (before, after))
+            cells = (told_figure(each, name, 4) for each in (before, after))
             rows.append((name.replace("_", " ") + (f" ({unit})" if unit else ""), *cells))
         notes = [paragraph(note) for note in self.notes]
         return page(repr(self)[1:-1], table(["", "before", "tuned"], rows), *notes)
