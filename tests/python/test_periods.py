@@ -97,6 +97,9 @@ def test_the_study_tells_which_period_is_survived(tmp_path: Path) -> None:
     assert "0.2 s is survived: search among longer ones." in together.notes
     grown = replace(together, runs=(replace(together[0.2], verdict="grows"),))
     assert "0.2 s is not survived: search among shorter ones." in grown.notes
+    hopeless = replace(grown, unperturbed_limit=0.0).notes
+    assert "0.2 s is not survived." in hopeless
+    assert "Without robust part and perturbation the loop is unstable, however short the period." in hopeless
     assert together[0.2].verdict == "shrinks"
     assert "0.2 s shrinks" in repr(together)
     assert "difference from the whole game" in together._repr_html_()

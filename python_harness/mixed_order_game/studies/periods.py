@@ -61,8 +61,8 @@ class Periods:
     whole_error: float  # largest |x_il - x*_il| in the last fifth, of the whole game, which always talks
     runs: tuple[Period, ...]
     unperturbed_limit: float | None
-    """Period in s below which the loop of Theorem 2 is stable; None if a cost has an expression, or of many
-    players."""
+    """Period in s below which the loop of Theorem 2 is stable, 0 if it is unstable itself; None if a cost has an
+    expression, or of many players."""
     survived: tuple[float, float] | None = None
     """Periods in s that were found by search: one that is survived, and one not much longer that is not."""
     searched: bool = False
@@ -87,11 +87,16 @@ class Periods:
             inside, beyond = self.survived
             said.append(f"In {self.stop_time:g} s, {inside:.3g} s is survived, {beyond:.3g} s is not.")
         elif self.searched and self.runs[0].verdict == "grows":
-            said.append(f"{self.runs[0].period:g} s is not survived: search among shorter ones.")
+            hint = "" if self.unperturbed_limit == 0.0 else ": search among shorter ones"
+            said.append(f"{self.runs[0].period:g} s is not survived{hint}.")
         elif self.searched:
             said.append(f"{self.runs[-1].period:g} s is survived: search among longer ones.")
-        if self.unperturbed_limit is not None:
-            limit = self.unperturbed_limit
+        limit = self.unperturbed_limit
+        if limit == 0.0:
+            said.append(
+                "Without robust part and perturbation the loop is unstable, however short the period."
+            )
+        elif limit is not None:
             known = (
                 "for every period that was tried" if np.isinf(limit) else f"for periods below {limit:.3g} s"
             )
