@@ -61,8 +61,8 @@ class Periods:
     whole_error: float  # largest |x_il - x*_il| in the last fifth, of the whole game, which always talks
     runs: tuple[Period, ...]
     unperturbed_limit: float | None
-    """Period in s below which the loop of Theorem 2 is stable, 0 if it is unstable itself; None if a cost has an
-    expression, or of many players."""
+    """Period in s below which the loop of Theorem 2 is stable, 0 if it is unstable itself; None if a cost has
+    an expression, or of many players."""
     survived: tuple[float, float] | None = None
     """Periods in s that were found by search: one that is survived, and one not much longer that is not."""
     searched: bool = False
