@@ -398,3 +398,16 @@ def test_unknown_dynamics_without_a_slope_at_the_equilibrium_leave_the_unperturb
         assert np.isfinite(simulator.jacobian(states, {**at_rest, "perturbed": False})).all()
         with pytest.raises(mog.SimulationError, match="has none where it is taken"):
             simulator.jacobian(states, at_rest)
+
+
+def test_a_directed_graph_is_told_as_in_games_of_coefficients(tmp_path: Path) -> None:
+    path = tmp_path / "game.toml"
+    directed = (SELLERS % "0.0").replace("[graph]\n", "[graph]\ndirected = true\n")
+    path.write_text(directed, encoding="utf-8")
+    found = analyse(path, box=0.3)
+    (graph,) = [each for each in found.hypotheses if each.name == "Assumption 2: undirected connected graph"]
+    assert graph.holds is False
+    assert re.fullmatch(
+        r"lambda_min\(the symmetric part of L \(x\) I \+ A_0\) = \S+; directed, strongly connected",
+        graph.figures,
+    )

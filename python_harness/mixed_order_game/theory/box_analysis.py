@@ -25,8 +25,7 @@ from .design import K3_MARGIN, Design, design_within
 from .domain import initial_errors
 from .findings import Demonstration, Figure, Row
 from .game import AnalysedGame, Gains, game_of_model, moving
-from .graph import unreached
-from .hypotheses import BOUNDED, Hypothesis, gain_thresholds, told_for, unbounded_controls
+from .hypotheses import BOUNDED, Hypothesis, connected_graph, gain_thresholds, told_for, unbounded_controls
 from .spectrum import nash_equilibrium
 
 FloatArray = NDArray[np.float64]
@@ -347,7 +346,6 @@ class _Judge:
         eta, disturbed = float(b.dynamics.lipschitz.max()), float(b.disturbance_size.max())
         nu = float(b.velocities.lipschitz.max())
         along = f", max nu_i = {nu:.4g} where |v_jl| <= {b.speed:.4g}" if b.use_velocities else ""
-        connected = not unreached(p.adjacency) and c.slowest_consensus > 0.0
         return [
             *unbounded_controls(p),
             Hypothesis(
@@ -355,11 +353,7 @@ class _Judge:
                 holds=True,
                 figures=f"max l_i = {c.largest_lipschitz:.4g}",
             ),
-            Hypothesis(
-                "Assumption 2: undirected connected graph",
-                holds=connected and not p.directed,
-                figures=f"lambda_min(L (x) I + A_0) = {c.slowest_consensus:.4g}",
-            ),
+            connected_graph(p, c),
             Hypothesis(
                 "Assumption 3 in the box: strongly monotone", holds=True, figures=f"m = {c.monotonicity:.4g}"
             ),

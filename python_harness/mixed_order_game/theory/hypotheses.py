@@ -34,23 +34,13 @@ def standing_assumptions(game: AnalysedGame, c: LoopConstants) -> list[Hypothesi
         if squares.size
         else f"max eta_i = {slopes:.4g}"
     )
-    apart = [str(player + 1) for player in unreached(p.adjacency)]
-    path = f"; no path from player 1 to {', '.join(apart)}" if apart else ""
-    matrix = "L (x) I + A_0"
-    if p.directed:
-        path = "; directed, " + ("not strongly connected" if apart else "strongly connected")
-        matrix = f"the symmetric part of {matrix}"
     return [
         Hypothesis(
             "Assumption 1: own gradients globally Lipschitz",
             holds=True,
             figures=f"max l_i = {c.largest_lipschitz:.4g}",
         ),
-        Hypothesis(
-            "Assumption 2: undirected connected graph",
-            holds=not apart and c.slowest_consensus > 0.0 and not p.directed,
-            figures=f"lambda_min({matrix}) = {c.slowest_consensus:.4g}{path}",
-        ),
+        connected_graph(p, c),
         Hypothesis(
             "Assumption 3: strongly monotone", holds=c.monotonicity > 0.0, figures=f"m = {c.monotonicity:.4g}"
         ),
@@ -63,6 +53,21 @@ def standing_assumptions(game: AnalysedGame, c: LoopConstants) -> list[Hypothesi
             "Assumption 5: g globally Lipschitz, d bounded", holds=not squares.size, figures=lipschitz
         ),
     ]
+
+
+def connected_graph(p: GameParameters, c: LoopConstants) -> Hypothesis:
+    """Assumption 2."""
+    apart = [str(player + 1) for player in unreached(p.adjacency)]
+    path = f"; no path from player 1 to {', '.join(apart)}" if apart else ""
+    matrix = "L (x) I + A_0"
+    if p.directed:
+        path = "; directed, " + ("not strongly connected" if apart else "strongly connected")
+        matrix = f"the symmetric part of {matrix}"
+    return Hypothesis(
+        "Assumption 2: undirected connected graph",
+        holds=not apart and c.slowest_consensus > 0.0 and not p.directed,
+        figures=f"lambda_min({matrix}) = {c.slowest_consensus:.4g}{path}",
+    )
 
 
 def unbounded_controls(parameters: GameParameters) -> list[Hypothesis]:
