@@ -61,23 +61,39 @@ class Evidence:
 
 
 def _predicted_rate(
-    simulator: Simulator, game: GameParameters, changes: Mapping[str, Value]
+    simulator: Simulator, game: GameParameters, changes: Mapping[str, Value], analysis: Analysis | None
 ) -> tuple[float | None, list[str]]:
-    """Spectral abscissa of the unperturbed loop in 1/s, and what there is to be told of it."""
+    """Spectral abscissa of the unperturbed loop in 1/s, and what there is to be told of it.
+
+    Of a large loop it is a bound, from the analysis.
+    """
     cost = has_expressions(game.expressions, "cost")
     if cost:
         try:
-            abscissa = linearized_loop(simulator, changes).abscissa
+            loop = linearized_loop(simulator, changes)
         except SimulationError as error:
             return None, [f"No rate is predicted: {cost}, and {error}."]
+        if loop.is_large:
+            return _bound_of_rate(analysis, f", for near x* alone: {cost}")
+        abscissa = loop.abscissa
         if has_affine_gradients(simulator.model.path, game.expressions):
             return abscissa, []
         return abscissa, [
             f"The predicted rate is that of the loop linearized at x*, for near x* alone: {cost}."
         ]
     if game.players > LARGEST_LINEAR_LOOP:
-        return None, [f"No rate is predicted: the linear loop of {game.players} players is too large."]
+        return _bound_of_rate(analysis, "")
     return spectral_abscissa(linear_loop(game)), []
+
+
+def _bound_of_rate(analysis: Analysis | None, near: str) -> tuple[float | None, list[str]]:
+    """Minus the rate of a loop that is too large for its eigenvalues; near ends the sentence."""
+    rows = () if analysis is None else analysis.rows
+    rate = next((float(row.value) for row in rows if row.name == "slowest rate"), None)
+    if rate is None:
+        return None, ["No rate is predicted: the linear loop is too large for its eigenvalues."]
+    told = "The predicted rate is a lower bound, as the linear loop is too large for its eigenvalues"
+    return -rate, [f"{told}{near}."]
 
 
 def _analysis(
@@ -128,7 +144,8 @@ def evidence_of_game(
         result = simulate("run", changes or {}, TOLERANCE, estimates=estimates)
         off = {**(changes or {}), "robust": False, "perturbed": False}
         plain = simulate("unperturbed run", off, PLAIN_TOLERANCE, estimates=False)
-        abscissa, note = _predicted_rate(simulator, game, changes or {})
+        analysis, without = _analysis(fmu, changes or {}, progress)
+        abscissa, note = _predicted_rate(simulator, game, changes or {}, analysis)
         notes += note
     if not estimates:
         many = f"there are N^2 D of them, and N = {model.players} exceeds {MOST_ESTIMATING}"
@@ -137,8 +154,7 @@ def evidence_of_game(
     if rates is None:
         unknown = has_expressions(game.expressions, *UNKNOWN)
         notes.append(f"The unknown term is not drawn: {unknown}, and the FMU exposes no time derivatives.")
-    analysis, note = _analysis(fmu, changes or {}, progress)
-    notes += note
+    notes += without
     validation = None
     if changes:
         notes.append("The claims are about the game as it stands; this run has changed parameters.")
