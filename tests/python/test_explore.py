@@ -286,6 +286,13 @@ def test_facts(vehicles: Simulator) -> None:
     assert [control["name"] for control in h][:4] == ["p", "peak", "Q", "h[1]"]
 
 
+def test_no_control_for_a_gain_that_moves_no_player(tmp_path: Path) -> None:
+    game = tmp_path / "quick.toml"
+    game.write_text(new_game(Recipe(players=2, dimension=1, orders="second", graph="path")), encoding="utf-8")
+    gains = facts_of(read_model(game), "")["gains"]
+    assert [control["name"] for control in gains] == ["k2", "k3", "k4", "beta", "delta", "epsilon"]
+
+
 def test_the_page_asks_no_network_for_anything() -> None:
     for path in PAGE.iterdir():
         text = path.read_text(encoding="utf-8").replace("http://www.w3.org/2000/svg", "")

@@ -4,7 +4,7 @@ from typing import Any
 
 from ..fmu.model import Model, Variable
 from ..game.definition import named_parameters
-from ..game.parameters import GAINS
+from ..game.parameters import GAINS, moves
 from .game_file import SWITCHES
 
 MOST_INPUTS = 100
@@ -14,6 +14,7 @@ MOST_INPUTS = 100
 def facts_of(model: Model, name: str) -> dict[str, Any]:
     """Sizes, names, controls with their ranges, graph and start; name is what the user called the game."""
     named = [each.name for each in named_parameters(model.game) if not each.fixed]
+    gains = [gain for gain in GAINS if moves(gain, model.order)]
     parameters = [variable for stem in named for variable in model.select([stem])]
     return {
         "name": name,
@@ -23,7 +24,7 @@ def facts_of(model: Model, name: str) -> dict[str, Any]:
         "dimension": model.dimension,
         "directed": model.directed,
         "stop_time": model.stop_time,
-        "gains": [_control(variable) for stem in GAINS for variable in model.select([stem])],
+        "gains": [_control(variable) for stem in gains for variable in model.select([stem])],
         "switches": [_control(model.variable(switch)) for switch in SWITCHES],
         "parameters": [_control(variable) for variable in parameters[:MOST_INPUTS]],
         "edges": {variable.name: variable.start for variable in model.indexed("a").values()},

@@ -1,7 +1,7 @@
 """A game's parameters as arrays: of its file, and of an FMU whose start values may be changed."""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -27,6 +27,11 @@ OfPlayers = float | FloatArray
 GAINS = ("k1", "k2", "k3", "k4", "beta", "delta", "epsilon")
 GAINS_OF_ORDER: Mapping[str, int] = {"k1": 1, "k4": 2}
 """Gains of the players of one order; others are of all."""
+
+
+def moves(gain: str, orders: Iterable[int]) -> bool:
+    """Whether a gain moves a player of one of these orders."""
+    return GAINS_OF_ORDER.get(gain) in {None, *orders}
 
 
 @dataclass(frozen=True, eq=False)

@@ -21,7 +21,7 @@ from ..errors import MixedOrderGameError, SimulationError
 from ..fmu.build import GameSource
 from ..fmu.model import Model, Value, check_value
 from ..game.graphs import CommunicationGraph, graph_of
-from ..game.parameters import GAINS_OF_ORDER, GameParameters, game_parameters
+from ..game.parameters import GAINS_OF_ORDER, GameParameters, game_parameters, moves
 from ..interrupts import noted_signals
 from ..notebook import digits, page, paragraph, table
 from ..results.metrics import METRIC_UNITS, SETTLED, Metrics, told_figure
@@ -730,14 +730,13 @@ def _require_common_gains(model: Model) -> None:
 
 def _moving(model: Model) -> tuple[str, ...]:
     """Gains of the linear loop, without k1 or k4 where no player has order 1 or 2."""
-    return tuple(name for name in LINEAR_GAINS if GAINS_OF_ORDER.get(name) in {None, *model.order})
+    return tuple(name for name in LINEAR_GAINS if moves(name, model.order))
 
 
 def _require_moving(model: Model, names: Sequence[str]) -> None:
     for name in names:
-        order = GAINS_OF_ORDER.get(name)
-        if order is not None and order not in model.order:
-            raise TuneError(f"{name} moves no player of this game: none has order {order}")
+        if not moves(name, model.order):
+            raise TuneError(f"{name} moves no player of this game: none has order {GAINS_OF_ORDER[name]}")
 
 
 def _connectivity(adjacency: FloatArray) -> float:

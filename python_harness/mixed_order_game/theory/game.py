@@ -13,7 +13,7 @@ from ..errors import GameError
 from ..fmu.build import fmu_of, source_of
 from ..fmu.model import Model, Value, read_model
 from ..game.definition import Table, require_coefficients
-from ..game.parameters import GAINS_OF_ORDER, GameParameters, common, game_parameters
+from ..game.parameters import GameParameters, common, game_parameters, moves
 from .graph import consensus_eigenvalues
 
 FloatArray = NDArray[np.float64]
@@ -65,10 +65,8 @@ class AnalysedGame:
 
 def moving(gains: Gains, parameters: GameParameters) -> list[tuple[str, float]]:
     """Gains by name, without k1 or k4 where no player has order 1 or 2."""
-    present = set(parameters.order.tolist())
-    return [
-        (name, value) for name, value in vars(gains).items() if GAINS_OF_ORDER.get(name) in {None, *present}
-    ]
+    orders = parameters.order.tolist()
+    return [(name, value) for name, value in vars(gains).items() if moves(name, orders)]
 
 
 def read_game(path: Path | str, changes: Mapping[str, Value] | None = None) -> AnalysedGame:
