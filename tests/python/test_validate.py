@@ -229,9 +229,22 @@ def test_what_grows_for_ever_is_not_run_to_the_limit(tmp_path: Path) -> None:
     assert re.search(r"grows from window to window: .* by \d\d\.?\d* s\.$", claim.reason)
 
 
+def test_what_grows_by_many_powers_of_ten_in_a_window(tmp_path: Path) -> None:
+    cost = "(x[i] - i)^2 + 0.1 * exp(-x[i]^2) + 1.5 * x[1] * x[2]"
+    text = expressions(2, cost, "0", "0", 1.0).replace("k2 = 1.0", "k2 = 100.0")
+    validation = validate(built(text.replace("k3 = 50.0", "k3 = 2.0"), tmp_path))
+    claim = named(validation)["theorem_2_convergence"]
+    assert claim.verdict is Verdict.FAILS
+    assert re.match(
+        r"The largest \|x - x\*\| grows from window to window: .*e\+95, .*e\+114\.$", claim.reason
+    )
+    assert validation.plain is not None
+    assert validation.plain.stop_time == 20.0
+
+
 def test_what_comes_back_from_far_away_is_run_to_its_end(tmp_path: Path) -> None:
     """Each player drives the one before, and nothing decays until all has passed through: 1e13 first."""
-    cost = "0.5 * x[i]^2 + if(i < N, -200 * x[i] * x[min(i + 1, N)], 0)"
+    cost = "0.5 * x[i]^2 + 0.1 * exp(-x[i]^2) + if(i < N, -200 * x[i] * x[min(i + 1, N)], 0)"
     validation = validate(built(expressions(7, cost, "0", "sin(t)", 1.0), tmp_path))
     claims = named(validation)
     assert claims["practical_convergence_actions"].verdict is Verdict.HOLDS
@@ -267,6 +280,8 @@ def test_a_large_game_that_hides_its_estimates(tmp_path: Path) -> None:
     loose = validate(built(re.sub(r"k3 = .*", "k3 = 0.01", text), tmp_path), limit=25.0)
     failed = {"practical_convergence_actions", "practical_convergence_velocities", "theorem_2_convergence"}
     assert failed | {"theorem_2_stability"} < {*loose.named(Verdict.FAILS)}
+    assert loose.plain is not None
+    assert loose.plain.stop_time == 20.0  # which shows no growth yet
     assert named(loose)["practical_convergence_actions"].reason.startswith(
         "The unperturbed loop is unstable, modes grow, and the robust part"
     )

@@ -209,13 +209,15 @@ def _judged(
         ]
         return Validation(model, tuple(claims), (), None, None)
     spectrum = spectrum_of(game)
+    stability = unperturbed_loop_stable(game, spectrum, _locally(simulator, game))
     plain: Result | Ended
     if has_expressions(game.expressions, "cost") and game.jacobian is None:
         plain, spectrum = run_until_decay_is_seen(simulator, game, spectrum, limit, progress)
     else:
-        plain = unperturbed_run(simulator, game, spectrum, progress=progress)
-    stability = unperturbed_loop_stable(game, spectrum, _locally(simulator, game))
-    convergence = unperturbed_actions_converge(game, spectrum, plain)
+        known_to_grow = spectrum.abscissa is None and stability.verdict is Verdict.FAILS
+        stop = model.stop_time if known_to_grow else None
+        plain = unperturbed_run(simulator, game, spectrum, stop_time=stop, progress=progress)
+    convergence = unperturbed_actions_converge(game, spectrum, plain, stability)
     robust = _default_experiment(simulator, game, progress)
     observed = None
     practical = _practical_despite(game, stability, convergence)

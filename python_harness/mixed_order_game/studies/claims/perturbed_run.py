@@ -119,7 +119,8 @@ def perturbed_run(
 def _measured(result: Result, game: GameParameters, window: float) -> PerturbedRun:
     unknown = unknown_term(game, result)
     judged = result.window(result.time[-1] - WINDOWS * window, np.inf)
-    largest = float(np.abs(result.x[judged]).max())
+    first = result.window(result.time[-1] - WINDOWS * window, result.time[-1] - (WINDOWS - 1) * window)
+    largest = float(np.abs(result.x[first]).max())  # later ones of a run that grows say nothing of its start
     floor = RESOLVED * TOLERANCE * (largest + 0.01)
     steepest = 1.0  # 1/s, where it is not known
     if not has_expressions(game.expressions, "cost"):

@@ -19,7 +19,7 @@ from ...results.result import Result
 from ...theory.growing_modes import Stability, stability
 from ...theory.spectrum import consensus_rate, linear_loop, monotonicity_constant, predicted_deviation
 from .early_end import GONE, Ended, run_or_end, size_of_actions
-from .settling import EXTENSION, TIME_CONSTANTS, Maxima, window_maxima, window_of
+from .settling import EXTENSION, TIME_CONSTANTS, WINDOWS, Maxima, window_maxima, window_of
 from .tolerances import PLAIN_TOLERANCE
 from .verdict import Claim, Verdict
 
@@ -166,15 +166,24 @@ def _stop_time(model: Model, spectrum: Spectrum) -> float:
     return DECAY / spectrum.slowest_rate if spectrum.slowest_rate > 0.0 else model.stop_time
 
 
-def unperturbed_actions_converge(game: GameParameters, spectrum: Spectrum, run: Result | Ended) -> Claim:
-    """The run follows the exact solution down to x*, neither slower nor faster."""
+def unperturbed_actions_converge(
+    game: GameParameters, spectrum: Spectrum, run: Result | Ended, stability: Claim | None = None
+) -> Claim:
+    """The run follows the exact solution down to x*, neither slower nor faster.
+
+    stability: that of unperturbed_loop_stable, which decides where a large linear loop is unstable.
+    """
 
     def claim(verdict: Verdict, reason: str, **figures: float) -> Claim:
         statement = "Theorem 2: unperturbed actions converge to x* as the exact solution does"
         return Claim("theorem_2_convergence", statement, verdict, reason, figures)
 
-    if spectrum.unstable:
-        return claim(Verdict.FAILS, f"The loop is unstable: a mode grows at {spectrum.abscissa:.4g} 1/s.")
+    linear = game.jacobian is not None or not has_expressions(game.expressions, "cost")
+    grows = f"a mode grows at {spectrum.abscissa:.4g} 1/s." if spectrum.unstable else ""
+    if linear and not grows and stability is not None and stability.verdict is Verdict.FAILS:
+        grows = stability.reason
+    if grows:
+        return claim(Verdict.FAILS, f"The loop is unstable: {grows}")
     if isinstance(run, Ended):
         return claim(Verdict.FAILS if run.escaped else Verdict.NOT_SETTLED, str(run))
     if spectrum.abscissa is None:
@@ -249,15 +258,18 @@ def slowest_rate_seen(run: Result | Ended) -> float:
     return max(0.0, float(rates.min()))
 
 
-def _floor(run: Result) -> float:
-    """Distance from x* that the integrator does not resolve."""
-    return RESOLVED * PLAIN_TOLERANCE * (float(np.abs(run.x).max()) + 0.01)
+def _floor(run: Result, until: float = np.inf) -> float:
+    """Distance from x* that the integrator does not resolve, by the largest action up to a time in s."""
+    largest = float(np.abs(run.x[run.window(-np.inf, until)]).max())
+    return RESOLVED * PLAIN_TOLERANCE * (largest + 0.01)
 
 
 def _last_windows(run: Result) -> Maxima:
-    """Of the largest |x - x*|."""
+    """Of the largest |x - x*|; what is not resolved is that of the first of them, where a run may grow."""
+    stop = float(run.time[-1])
+    window = window_of(stop, 0.0)
     error = np.abs(run.x - run.x_star).max(axis=(1, 2))
-    return window_maxima(run.time, error, window_of(float(run.time[-1]), 0.0), _floor(run))
+    return window_maxima(run.time, error, window, _floor(run, stop - (WINDOWS - 1) * window))
 
 
 def _has_gone(run: Result, game: GameParameters) -> bool:
