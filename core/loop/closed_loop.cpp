@@ -96,7 +96,6 @@ void ClosedLoop::initial_state(const InitialState& initial, Real* state) const {
 }
 
 void ClosedLoop::gather_plants(const Real* state, const Real* inputs, Signals& signals) const {
-  for (AlignedVector* joint : {&signals.actions, &signals.references}) joint->resize(at(shape().actions()));
   for (const OwnEntry& own : own_) {
     if (own.x >= 0) signals.actions[at(own.entry)] = state[own.x];
     if (own.reference >= 0) signals.references[at(own.entry)] = state[own.reference];

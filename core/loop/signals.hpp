@@ -27,6 +27,8 @@ struct Signals {
         control(at(shape.own_entries())),
         radial(at(shape.own_entries())),
         exponent(at(shape.hosts()) * at(shape.neurons + 2) + 8),
+        actions(shape.hosts_all() && shape.external.empty() ? 0 : at(shape.actions())),
+        references(actions.size()),
         activation(at(shape.own_entries()) * at(shape.neurons)) {}
 
   AlignedVector shared;       ///< xbar: z (order 1) or x (order 2), at entry(i, l); 0 where it is not known
@@ -39,7 +41,7 @@ struct Signals {
   AlignedVector control;      ///< u
   AlignedVector radial;       ///< w'S / W_max on the sphere while e w'S >= 0, else 0
   AlignedVector exponent;     ///< scratch
-  AlignedVector actions;      ///< scratch of ClosedLoop::plants
+  AlignedVector actions;      ///< scratch of ClosedLoop::plants, where the state does not hold all of them
   AlignedVector references;   ///< likewise
   AlignedVector activation;   ///< S_m(y_i) at m * H D + own entry
 };
