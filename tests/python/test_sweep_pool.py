@@ -62,7 +62,7 @@ def test_a_machine_on_which_workers_die_is_told(fmu: Path, tmp_path: Path) -> No
 
 
 class Counted:
-    """A pool of two workers that have each chunk done at once, in 0.01 s a row."""
+    """A pool of two workers that have each chunk done at once, in 1/64 s a row."""
 
     workers = 2
 
@@ -72,7 +72,7 @@ class Counted:
     def submit(self, _settings: Settings, cases: Sequence[Case]) -> "Future[list[Outcome]]":
         self.chunks.append(len(cases))
         done: Future[list[Outcome]] = Future()
-        done.set_result([Outcome(case.row, None, "ok", 0.01) for case in cases])
+        done.set_result([Outcome(case.row, None, "ok", 1 / 64) for case in cases])
         return done
 
     def died(self, _error: BaseException) -> bool:
@@ -85,12 +85,12 @@ class Counted:
         pass
 
 
-def test_chunks_take_a_tenth_of_a_second_and_less_in_the_end() -> None:
+def test_chunks_take_a_fifth_of_a_second_and_less_in_the_end() -> None:
     pool, cases = Counted(), [Case(row, {}) for row in range(200)]
     outcomes = run_cases(pool, SHORT, iter(cases), len(cases))
     assert sorted(each.row for chunk in outcomes for each in chunk) == list(range(200))
     assert pool.chunks[:4] == [1, 1, 1, 1]  # as long as no run has told what it takes
-    assert pool.chunks[4:] == [*[10] * 16, 9, 6, 5, 4, 3, 2, *[1] * 7]
+    assert pool.chunks[4:] == [*[12] * 13, 10, 7, 5, 4, 3, 2, 2, *[1] * 7]
 
 
 @pytest.mark.parametrize("asked", [None, "3"])

@@ -46,11 +46,11 @@ def expect_file(path: Path, what: str, error: type[MixedOrderGameError]) -> None
 def _with_a_near_name(path: Path) -> str:
     """The nearest names beside a missing file, as the end of a sentence; empty where none is near."""
     try:
-        names = [each.name for each in path.parent.iterdir() if suffix_of(each) == suffix_of(path)]
+        files = {each.stem: each for each in path.parent.iterdir() if suffix_of(each) == suffix_of(path)}
     except (OSError, ValueError):
         return ""
-    near = difflib.get_close_matches(path.name, names, n=3)
-    return f"; did you mean {' or '.join(str(path.with_name(name)) for name in near)}?" if near else ""
+    near = [str(files[stem]) for stem in difflib.get_close_matches(path.stem, files, n=3)]
+    return f"; did you mean {' or '.join(near)}?" if near else ""
 
 
 def text_of(content: bytes) -> str:
