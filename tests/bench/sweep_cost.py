@@ -11,13 +11,14 @@ from __future__ import annotations
 import argparse
 import json
 import multiprocessing
-import resource
 import statistics
 import tempfile
 import time
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
+
+import psutil
 
 import mixed_order_game as mog  # light to import, as in a script of a user, which every worker reads
 
@@ -121,8 +122,10 @@ def sweep_with(definition: mog.Sweep, jobs: int) -> tuple[float, float]:
 
 
 def _cpu() -> float:
-    usage = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
-    return sum(each.ru_utime + each.ru_stime for each in usage)
+    """CPU seconds of this process and of all below it, those that have ended included."""
+    this = psutil.Process()
+    processes = [this, *this.children(recursive=True)]
+    return sum(sum(each.cpu_times()[:4]) for each in processes)  # user, system, and those of ended children
 
 
 if __name__ == "__main__":

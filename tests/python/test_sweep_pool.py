@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from mixed_order_game import read_model
 from mixed_order_game.studies.pool import WORKER_DIED, LocalPool, run_cases
 from mixed_order_game.studies.sampler import Settings
 from mixed_order_game.studies.sweep.conduct import sweep
@@ -93,20 +94,37 @@ def test_chunks_take_a_fifth_of_a_second_and_less_in_the_end() -> None:
     assert pool.chunks[4:] == [*[12] * 13, 10, 7, 5, 4, 3, 2, 2, *[1] * 7]
 
 
+ASKS = """
+import sys
+from mixed_order_game import read_model
+from mixed_order_game.studies.pool import LocalPool
+from mixed_order_game.studies.sampler import Settings
+from mixed_order_game.studies.worker import Case
+sys.path.append(sys.argv[1])
+import sweep_workers
+pool = LocalPool(read_model(sys.argv[2]), 1, sweep_workers.tells_of_threads)
+print(pool.submit(Settings(), [Case(0, {})]).result()[0].status)
+pool.close()
+"""
+
+
 @pytest.mark.parametrize("asked", [None, "3"])
-def test_workers_start_threads_only_when_asked(
-    fmu: Path, monkeypatch: pytest.MonkeyPatch, asked: str | None
-) -> None:
+def test_workers_start_threads_only_when_asked(fmu: Path, asked: str | None) -> None:
+    own = {name: value for name, value in os.environ.items() if name != "OPENBLAS_NUM_THREADS"}
+    environment = own if asked is None else {**own, "OPENBLAS_NUM_THREADS": asked}
+    command = [sys.executable, "-c", ASKS, str(Path(__file__).parent), str(fmu)]
+    told = subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stdout
+    assert told == (asked or "1") + "\n"
+
+
+def test_starting_workers_leaves_the_environment_as_it_is(fmu: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("OPENBLAS_NUM_THREADS", raising=False)
-    if asked is not None:
-        monkeypatch.setenv("OPENBLAS_NUM_THREADS", asked)
-    pool = LocalPool(fmu, 1, sweep_workers.tells_of_threads)
+    pool = LocalPool(read_model(fmu), 1)
     try:
-        [outcome] = pool.submit(SHORT, [Case(0, {})]).result()
+        pool.submit(SHORT, [Case(0, {})]).result()
     finally:
         pool.close()
-    assert outcome.status == (asked or "1")
-    assert os.environ.get("OPENBLAS_NUM_THREADS") == asked
+    assert "OPENBLAS_NUM_THREADS" not in os.environ
 
 
 def test_a_worker_keeps_one_fmu_only(fmu: Path) -> None:

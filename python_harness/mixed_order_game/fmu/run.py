@@ -184,7 +184,7 @@ class Simulator:
     Threads that share one wait for each other; to run at the same time each needs its own.
 
     fmu: a file (.fmu), or a game, of which it is made on first use: a game file (.toml), a game of the
-    package by its name, a Game, or None for the paper's example.
+    package by its name, a Game, or None for the paper's example; or the Model that read_model made of one.
     Raises what read_model raises, SimulationError if the FMU cannot be loaded on this machine.
     """
 
@@ -192,8 +192,8 @@ class Simulator:
     _library: Path | None = None
     """Shared library to load in place of the FMU's own."""
 
-    def __init__(self, fmu: GameSource = None) -> None:
-        self.model: Model = read_model(fmu)
+    def __init__(self, fmu: GameSource | Model = None) -> None:
+        self.model: Model = fmu if isinstance(fmu, Model) else read_model(fmu)
         if self._holds_all_players:
             self.model.require_all_players()
         self._outside: dict[tuple[int, ...], Simulator] = {}

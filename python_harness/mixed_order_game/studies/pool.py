@@ -10,21 +10,24 @@ import multiprocessing
 import os
 import shutil
 import signal
+import sys
 import tempfile
 import threading
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
+from dataclasses import replace
 from itertools import islice
 from multiprocessing import connection
-from pathlib import Path
+from multiprocessing.context import BaseContext
 from typing import Protocol
 
 from ..errors import ModelError
+from ..fmu.model import Model
 from ..interrupts import blocked_interrupt
 from .sampler import Settings
-from .worker import Case, Outcome, PoolError, Source, Work, run_chunk
+from .worker import Case, Outcome, PoolError, Source, Work, run_chunk, take_model
 
 LARGEST_CHUNK = 32
 CHUNK_SECONDS = 0.2
@@ -66,10 +69,11 @@ class Pool(Protocol):
 class LocalPool:
     """Processes on this machine. They end at once when this process closes the pool, or ends in any way."""
 
-    def __init__(self, fmu: Path, jobs: int, work: Work = run_chunk) -> None:
+    def __init__(self, model: Model, jobs: int, work: Work = run_chunk) -> None:
         self.workers = jobs
         self._work = work
-        self._source = Source.of(fmu)
+        self._model = replace(model, path=model.path.resolve())
+        self._source = Source.of(self._model.path)
         self._folder = tempfile.TemporaryDirectory(prefix="mixed-order-game-")
         self._open()
 
@@ -95,11 +99,14 @@ class LocalPool:
         self._folder.cleanup()
 
     def _open(self) -> None:
-        context = multiprocessing.get_context("spawn")
+        context = _context()
         # Nobody writes into this pipe: its end tells the workers that this side is gone.
         reader, self._writer = context.Pipe(duplex=False)
         self._executor = ProcessPoolExecutor(
-            self.workers, context, initializer=_begin, initargs=(reader, self._folder.name)
+            self.workers,
+            context,
+            initializer=_begin,
+            initargs=(reader, self._folder.name, self._model, dict(os.environ)),
         )
         self._reader = reader
 
@@ -107,6 +114,18 @@ class LocalPool:
         self._writer.close()
         self._executor.shutdown(wait=True, cancel_futures=True)
         self._reader.close()
+
+
+def _context() -> BaseContext:
+    """How workers begin: on Linux as forks of a process that imports what they need and does nothing else.
+
+    It stays for the next sweep. Elsewhere each worker imports for itself.
+    """
+    if sys.platform != "linux":
+        return multiprocessing.get_context("spawn")
+    context = multiprocessing.get_context("forkserver")
+    context.set_forkserver_preload([run_chunk.__module__])
+    return context
 
 
 @contextlib.contextmanager
@@ -125,10 +144,15 @@ def _without_threads() -> Iterator[None]:
         del os.environ[BLAS_THREADS]
 
 
-def _begin(reader: connection.Connection, folder: str) -> None:
-    """Begin a worker: unpack into the pool's own folder, leave Ctrl-C to the parent and end when it ends."""
+def _begin(reader: connection.Connection, folder: str, model: Model, environment: dict[str, str]) -> None:
+    """Begin a worker: unpack into the pool's own folder, leave Ctrl-C to the parent and end when it ends.
+
+    environment: the parent's, which may have changed since what the worker was forked from began.
+    """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    os.environ.update(environment)
     tempfile.tempdir = folder
+    take_model(model)
     threading.Thread(target=_end_with, args=(reader, folder), daemon=True).start()
 
 
@@ -139,21 +163,21 @@ def _end_with(reader: connection.Connection, folder: str) -> None:
 
 
 def open_pool(
-    fmu: Path, *, jobs: int | None = None, scheduler: str | None = None, work: Work = run_chunk
+    model: Model, *, jobs: int | None = None, scheduler: str | None = None, work: Work = run_chunk
 ) -> Pool:
     """The workers wished: of a Dask scheduler, or so many processes here (default: one a usable core).
 
     Raises PoolError for a count that is not positive or a scheduler that cannot be reached.
     """
-    if not fmu.is_file():
-        raise ModelError(f"there is no FMU {fmu}")
+    if not model.path.is_file():
+        raise ModelError(f"there is no FMU {model.path}")
     if scheduler is not None:
         from .dask_pool import DaskPool
 
-        return DaskPool(fmu, scheduler, work)
+        return DaskPool(model.path, scheduler, work)
     if jobs is not None and jobs < 1:
         raise PoolError(f"jobs = {jobs} is not positive")
-    return LocalPool(fmu, usable_cores() if jobs is None else jobs, work)
+    return LocalPool(model, usable_cores() if jobs is None else jobs, work)
 
 
 def usable_cores() -> int:

@@ -670,7 +670,7 @@ class _Search:
         values = [{**self.fixed, **edges, **gains} for edges in self.edges]
         self.simulations += len(values)
         found: list[Metrics | None] = [None] * len(values)
-        pool = open_pool(self.sampler.model.path, jobs=self.jobs)
+        pool = open_pool(self.sampler.model, jobs=self.jobs)
         try:
             cases = [Case(k, each) for k, each in enumerate(values)]
             for outcomes in run_cases(pool, self.settings, cases, len(cases), ready=self.take_signals):

@@ -14,7 +14,7 @@ from time import thread_time
 from typing import Self
 
 from ..errors import MixedOrderGameError, SimulationError
-from ..fmu.model import Value
+from ..fmu.model import Model, Value
 from ..results.metrics import Metrics
 from ..version import package_version
 from .sampler import Sampler, Settings
@@ -62,6 +62,12 @@ class Source:
 Work = Callable[[Source, Settings, Sequence[Case]], list[Outcome]]
 
 _loaded = threading.local()
+_models: dict[Path, Model] = {}
+
+
+def take_model(model: Model) -> None:
+    """What this process need not read of an FMU, because another one has."""
+    _models[model.path] = model
 
 
 def run_chunk(source: Source, settings: Settings, cases: Sequence[Case]) -> list[Outcome]:
@@ -90,7 +96,7 @@ def _sampler(source: Source) -> Sampler:
         atexit.unregister(held[1].close)
         _loaded.sampler = None
     if source.path is not None:
-        sampler = Sampler(source.path)
+        sampler = Sampler(_models.get(source.path, source.path))
     else:
         with tempfile.TemporaryDirectory(prefix="mixed-order-game-") as folder:
             path = Path(folder) / "MixedOrderGame.fmu"

@@ -120,7 +120,7 @@ def _carried_out(
             store.write_due()
 
         if rows:
-            pool = open_pool(definition.model.path, jobs=jobs, scheduler=scheduler, work=work)
+            pool = open_pool(definition.model, jobs=jobs, scheduler=scheduler, work=work)
             with closing(pool), closing(store):
                 cases = map(definition.case, rows)
                 for outcomes in run_cases(pool, definition.settings, cases, len(rows), ready=ready):
