@@ -6,7 +6,7 @@ import networkx as nx
 import numpy as np
 import pytest
 
-from mixed_order_game import read_model
+from mixed_order_game import default_game, read_model
 from mixed_order_game.game.graphs import (
     CommunicationGraph,
     GraphError,
@@ -105,6 +105,21 @@ def test_edges_of_an_fmu(fmu: Path, fmu_of: FmuOf) -> None:
     weighted = read_model(fmu_of("weighted_graph"))
     again = graph_of_text(graph_of_model(weighted).label, weighted.players)
     np.testing.assert_array_equal(again.adjacency, graph_of_model(weighted).adjacency)
+
+
+def test_weights_of_a_directed_game(tmp_path: Path) -> None:
+    """a[i,j] is with what weight i hears j; players of an undirected graph hear each other."""
+    text = default_game().read_text(encoding="utf-8").replace("[graph]\n", "[graph]\ndirected = true\n")
+    (tmp_path / "game.toml").write_text(text, encoding="utf-8")
+    model = read_model(tmp_path / "game.toml")
+
+    def heard(edges: str) -> dict[str, float]:
+        values = graph_of_text(edges, 5).start_values(model)
+        assert len(values) == 20
+        return {name: value for name, value in values.items() if value}
+
+    assert heard("1>2:0.5 5>3") == {"a[2,1]": 0.5, "a[3,5]": 1.0}
+    assert heard("1-2:0.5 3-5") == {"a[1,2]": 0.5, "a[2,1]": 0.5, "a[3,5]": 1.0, "a[5,3]": 1.0}
 
 
 @pytest.mark.parametrize(
